@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The part of a depth image that may belong to the person, as points on a pixel grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+
+from kintrack.geometry import PinholeCamera
+from kintrack.sequence.frame import Frame
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Observed points at working resolution."""
+
+    camera: PinholeCamera
+    """Camera of the thinned grid."""
+    points_camera: Float[ndarray, "h w 3"]
+    """Point of every pixel, camera frame [m]; z = 0 where there is none."""
+    region: Bool[ndarray, "h w"]
+    """Pixels that may belong to the person."""
+
+
+def observe(frame: Frame, max_width_px: int) -> Observation:
+    """Back-project a frame, thinned to at most `max_width_px` columns.
+
+    Args:
+        frame: A good frame.
+        max_width_px: Largest working width [px].
+
+    Returns:
+        The observation; its region is every pixel with a reading.
+    """
+    assert frame.depth_m is not None
+    factor = -(-frame.camera.width // max_width_px)
+    camera = frame.camera.scaled(factor)
+    points = camera.back_project(frame.depth_m[::factor, ::factor])
+    return Observation(camera, points, points[..., 2] > 0)
+
+
+def within(observation: Observation, box_camera: Float[ndarray, "2 3"]) -> Observation:
+    """The observation restricted to points inside an axis-aligned box of the camera frame."""
+    low, high = box_camera
+    p = observation.points_camera
+    inside = ((p >= low) & (p <= high)).all(axis=-1)
+    return Observation(observation.camera, p, observation.region & inside)

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Association by window search [Wan19, Walsman17], and its reverse.
+
+Skin to pixels: every visible vertex projects into the depth image and takes the nearest observed
+3-D point in a window around that pixel. Pixels to skin: a regular subset of the observed pixels
+takes the nearest visible vertex, so that an arm which the model does not cover pulls it back.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numba import njit
+from numpy import ndarray
+from scipy.spatial import cKDTree
+
+from kintrack.association.observation import Observation
+
+
+class Pairs(NamedTuple):
+    """Vertices and the observed points they should lie on."""
+
+    vertex: Int[ndarray, " n"]
+    """Vertex index."""
+    points_camera: Float[ndarray, "n 3"]
+    """Observed point, camera frame [m]."""
+    from_skin: Int[ndarray, ""]
+    """How many of the pairs were found from the skin; they come first."""
+
+
+MAX_HALF_WINDOW = 8
+"""Pixels looked at on each side of the projection; wider windows skip pixels evenly."""
+
+
+def associate(
+    observation: Observation,
+    vertices_camera: Float[ndarray, "v 3"],
+    visible: Bool[ndarray, " v"],
+    gate_m: float,
+    pixel_pairs: int,
+) -> Pairs:
+    """Pair skin and observation in both directions.
+
+    Args:
+        observation: Observed points with the region that may be the person.
+        vertices_camera: Skin vertices, camera frame [m].
+        visible: Vertices that may pair.
+        gate_m: Largest distance of a pair [m].
+        pixel_pairs: About how many pixels look for a vertex; 0 for the paper's one direction.
+
+    Returns:
+        The pairs, in a fixed order.
+    """
+    index = np.flatnonzero(visible)
+    camera = observation.camera
+    pixel = _search(
+        vertices_camera[index], observation.points_camera, observation.region,
+        camera.fx, camera.fy, camera.cx, camera.cy, gate_m,
+    )
+    found = pixel >= 0
+    flat = observation.points_camera.reshape(-1, 3)
+    vertex, points = index[found], flat[pixel[found]]
+    n = len(vertex)
+    if pixel_pairs and len(index):
+        seen = sample_region(observation, pixel_pairs)
+        distance, nearest = cKDTree(vertices_camera[index]).query(
+            seen, distance_upper_bound=gate_m
+        )
+        near = np.isfinite(distance)
+        vertex = np.concatenate([vertex, index[nearest[near]]])
+        points = np.concatenate([points, seen[near]])
+    return Pairs(vertex, points, n)
+
+
+def sample_region(observation: Observation, count: int) -> Float[ndarray, "n 3"]:
+    """About `count` points of the region on a regular pixel grid, camera frame [m]."""
+    step = max(1, int(np.sqrt(np.count_nonzero(observation.region) / count)))
+    thin = observation.region[::step, ::step]
+    return observation.points_camera[::step, ::step][thin]
+
+
+@njit(cache=True)
+def _search(v, points, region, fx, fy, cx, cy, gate):
+    h, w = region.shape
+    out = np.full(v.shape[0], -1, dtype=np.int64)
+    for i in range(v.shape[0]):
+        x, y, z = v[i, 0], v[i, 1], v[i, 2]
+        u = int(np.floor(fx * x / z + cx + 0.5))
+        r = int(np.floor(fy * y / z + cy + 0.5))
+        half = int(np.ceil(fx * gate / z))
+        step = (half + MAX_HALF_WINDOW - 1) // MAX_HALF_WINDOW
+        half = half // step * step
+        best = gate * gate
+        for a in range(r - half, r + half + 1, step):
+            if a < 0 or a >= h:
+                continue
+            for b in range(u - half, u + half + 1, step):
+                if b < 0 or b >= w or not region[a, b]:
+                    continue
+                dx = points[a, b, 0] - x
+                dy = points[a, b, 1] - y
+                dz = points[a, b, 2] - z
+                d = dx * dx + dy * dy + dz * dz
+                if d < best:
+                    best = d
+                    out[i] = a * w + b
+    return out

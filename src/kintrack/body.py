@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The URDF human: its kinematic tree in Pinocchio and the joints that kintrack reports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from kintrack.errors import ModelError
+from kintrack.joints import JOINT_NAMES
+
+FRAME_OF_JOINT = {
+    "pelvis": "pelvis",
+    "spine": "abdomen",
+    "chest": "chest",
+    "neck": "head",
+    "head": "head_center",
+    **{
+        f"{s}_{joint}": f"{s}_{frame}"
+        for s in "lr"
+        for joint, frame in (
+            ("shoulder", "upper_arm"),
+            ("elbow", "forearm"),
+            ("wrist", "hand"),
+            ("hand", "hand_center"),
+            ("hip", "thigh"),
+            ("knee", "shank"),
+            ("ankle", "foot"),
+            ("foot", "toe_base"),
+        )
+    },
+}
+"""Reported joint centre -> URDF frame whose origin it is. `neck` is the base of the skull."""
+
+
+def model_folder() -> Path:
+    """The `model/` folder that ships: inside the installed package, or at the project's top."""
+    inside = Path(__file__).parent / "model"
+    return inside if inside.is_dir() else Path(__file__).parents[2] / "model"
+
+
+@dataclass(frozen=True)
+class Body:
+    """Kinematic tree with a free-flyer root; q is (x y z, qx qy qz qw, hinges), v is (48,)."""
+
+    model: pin.Model
+    """Pinocchio model, nq = 49, nv = 48."""
+    link_names: tuple[str, ...]
+    """Links that carry skin, parents before children."""
+    link_joints: Int[ndarray, " l"]
+    """Pinocchio joint that moves each link."""
+    support: Bool[ndarray, "l nv"]
+    """True where a velocity component moves a link."""
+    joint_frames: Int[ndarray, " j"]
+    """Pinocchio frame of each of `JOINT_NAMES`."""
+    lower: Float[ndarray, " nv"]
+    """Lower bound per velocity component [rad]; -inf for the root."""
+    upper: Float[ndarray, " nv"]
+    """Upper bound per velocity component [rad]; inf for the root."""
+
+    @property
+    def nq(self) -> int:
+        """Length of q."""
+        return self.model.nq
+
+    @property
+    def nv(self) -> int:
+        """Length of v, the tangent space."""
+        return self.model.nv
+
+    def neutral(self) -> Float[ndarray, " nq"]:
+        """Standing at the origin with hanging arms."""
+        return pin.neutral(self.model)
+
+    def dof(self, joint: str) -> int:
+        """Index into v of a hinge, by its URDF name.
+
+        Raises:
+            ModelError: if the body has no such hinge.
+        """
+        if not self.model.existJointName(joint):
+            names = ", ".join(list(self.model.names)[2:])
+            raise ModelError(f"no joint {joint!r} in the body; it has: {names}")
+        return self.model.joints[self.model.getJointId(joint)].idx_v
+
+    def integrate(self, q: Float[ndarray, " nq"], v: Float[ndarray, " nv"]) -> ndarray:
+        """q moved by the tangent vector v (`pin.integrate`)."""
+        return pin.integrate(self.model, q, v)
+
+    def difference(self, q0: Float[ndarray, " nq"], q1: Float[ndarray, " nq"]) -> ndarray:
+        """Tangent vector from q0 to q1 (`pin.difference`)."""
+        return pin.difference(self.model, q0, q1)
+
+
+@dataclass(frozen=True)
+class BodyState:
+    """A body whose kinematics have been run at q; world frame."""
+
+    body: Body
+    """The body."""
+    q: Float[ndarray, " nq"]
+    """Configuration."""
+    Ts_world_link: Float[ndarray, "l 4 4"]
+    """Pose of every skin-carrying link."""
+    J_world: Float[ndarray, "6 nv"]
+    """Spatial motion of each velocity component (linear at the world origin, angular).
+
+    A point x of a link that component k moves has velocity `J[:3, k] + J[3:, k] x x`.
+    """
+    joint_positions_world: Float[ndarray, "j 3"]
+    """Reported joint centres [m], order of `JOINT_NAMES`."""
+
+
+def read_arrays(path: Path) -> dict[str, ndarray]:
+    """The arrays of one file of the model.
+
+    Raises:
+        ModelError: if the file is missing or broken.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except (OSError, ValueError, EOFError, BadZipFile) as error:
+        raise ModelError(f"{path}: cannot be read as part of the model ({error})") from error
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Link frames in bind pose, the pose the skins are given in; root frame."""
+
+    link_names: tuple[str, ...]
+    """Links that carry skin, parents before children."""
+    Ts_root_link: Float[ndarray, "l 4 4"]
+    """Bind pose of the links, for the given shape."""
+    extra_offsets: dict[str, Float[ndarray, "3"]]
+    """Change of the fixed frames that are no link's origin, root axes [m]."""
+
+
+def load_rig(folder: Path, shape: Float[ndarray, " k"] | None = None) -> Rig:
+    """Bind frames of a person.
+
+    Args:
+        folder: Model folder.
+        shape: Shape coefficients [standard deviations of the population]; the average if None.
+
+    Returns:
+        The rig; shape moves the frames and never turns them.
+
+    Raises:
+        ModelError: if a file is broken or there are more coefficients than the model has.
+    """
+    arrays = read_arrays(folder / "skin" / "rig.npz")
+    Ts = arrays["Ts_root_link_bind"].copy()
+    origins, extra = arrays["origins_basis_m"], arrays["extra_basis_m"]
+    b = shape_coefficients(shape, len(origins))
+    Ts[:, :3, 3] += np.tensordot(b, origins[: len(b)], 1)
+    names = (str(name) for name in arrays["extra_names"])
+    offsets = dict(zip(names, np.tensordot(b, extra[: len(b)], 1), strict=True))
+    return Rig(tuple(str(name) for name in arrays["link_names"]), Ts, offsets)
+
+
+def shape_coefficients(shape: Float[ndarray, " k"] | None, available: int) -> ndarray:
+    """Checked shape coefficients, shape (k,), k <= available."""
+    b = np.zeros(0) if shape is None else np.asarray(shape, dtype=float)
+    if b.ndim != 1 or len(b) > available or not np.isfinite(b).all():
+        raise ModelError(f"shape = {shape!r}: up to {available} finite coefficients are allowed")
+    return b
+
+
+def load_body(folder: Path | None = None, shape: Float[ndarray, " k"] | None = None) -> Body:
+    """Read the human's URDF and put it on a free-flyer.
+
+    Args:
+        folder: Folder with `human.urdf` and `skin/`; the one that ships if None.
+        shape: Shape coefficients [standard deviations]; the average adult if None.
+
+    Returns:
+        The body.
+
+    Raises:
+        ModelError: if the file is missing, is no URDF, or lacks a frame that kintrack needs.
+    """
+    folder = model_folder() if folder is None else Path(folder)
+    urdf = folder / "human.urdf"
+    if not urdf.is_file():
+        raise ModelError(f"{urdf}: no such file; a URDF of the human is needed")
+    try:
+        model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
+    except (ValueError, RuntimeError) as error:
+        raise ModelError(f"{urdf}: not a readable URDF ({error})") from error
+    rig = load_rig(folder, shape)
+    names = rig.link_names
+    needed = set(FRAME_OF_JOINT.values()) | set(names)
+    missing = sorted(name for name in needed if not model.existFrame(name))
+    if missing:
+        raise ModelError(f"{urdf}: lacks the frames {', '.join(missing)}, which kintrack needs")
+    if shape is not None:
+        _move_origins(model, rig, load_rig(folder))
+    joints = np.array([model.frames[model.getFrameId(n)].parentJoint for n in names])
+    support = np.zeros((len(names), model.nv), dtype=bool)
+    for row, joint in zip(support, joints, strict=True):
+        for ancestor in list(model.supports[int(joint)])[1:]:
+            j = model.joints[ancestor]
+            row[j.idx_v : j.idx_v + j.nv] = True
+    lower = np.full(model.nv, -np.inf)
+    upper = np.full(model.nv, np.inf)
+    for joint in list(model.joints)[2:]:
+        lower[joint.idx_v] = model.lowerPositionLimit[joint.idx_q]
+        upper[joint.idx_v] = model.upperPositionLimit[joint.idx_q]
+    frames = np.array([model.getFrameId(FRAME_OF_JOINT[name]) for name in JOINT_NAMES])
+    return Body(model, names, joints, support, frames, lower, upper)
+
+
+def _move_origins(model: pin.Model, rig: Rig, average: Rig) -> None:
+    """Shift joint origins and fixed frames from the average body's to a person's."""
+    moved = dict(zip(rig.link_names, rig.Ts_root_link[:, :3, 3], strict=True))
+    before = dict(zip(rig.link_names, average.Ts_root_link[:, :3, 3], strict=True))
+    R = dict(zip(rig.link_names, rig.Ts_root_link[:, :3, :3], strict=True))
+    for name in rig.link_names[1:]:
+        joint = model.frames[model.getFrameId(name)].parentJoint
+        chain = [joint]
+        while (owner := _link_of(model, model.parents[chain[-1]], rig.link_names)) is None:
+            chain.append(model.parents[chain[-1]])
+        delta = (moved[name] - before[name]) - (moved[owner] - before[owner])
+        placement = model.jointPlacements[chain[-1]]
+        placement.translation = placement.translation + R[owner].T @ delta
+        model.jointPlacements[chain[-1]] = placement
+    for name, offset in rig.extra_offsets.items():
+        frame = model.frames[model.getFrameId(name)]
+        owner = _link_of(model, frame.parentJoint, rig.link_names)
+        assert owner is not None
+        placement = frame.placement
+        placement.translation = placement.translation + R[owner].T @ (
+            offset - (moved[owner] - before[owner])
+        )
+        frame.placement = placement
+
+
+def _link_of(model: pin.Model, joint: int, names: tuple[str, ...]) -> str | None:
+    """The skin-carrying link that a joint moves, None for a joint between hinges."""
+    for name in names:
+        if model.frames[model.getFrameId(name)].parentJoint == joint:
+            return name
+    return None
+
+
+def run_kinematics(body: Body, q: Float[ndarray, " nq"]) -> BodyState:
+    """Forward kinematics and Jacobians at q.
+
+    Args:
+        body: The body.
+        q: Configuration, shape (nq,).
+
+    Returns:
+        A state whose poses are current.
+    """
+    model, data = body.model, body.model.createData()
+    J_world = pin.computeJointJacobians(model, data, q)
+    pin.updateFramePlacements(model, data)
+    Ts = np.empty((len(body.link_joints), 4, 4))
+    for T, joint in zip(Ts, body.link_joints, strict=True):
+        T[:] = data.oMi[int(joint)].homogeneous
+    positions = np.array([data.oMf[int(frame)].translation for frame in body.joint_frames])
+    return BodyState(body, np.array(q), Ts, np.ascontiguousarray(J_world), positions)
+
+
+def joint_jacobians(state: BodyState) -> Float[ndarray, "j 3 nv"]:
+    """Derivative of the reported joint centres with respect to v, world frame, shape (J, 3, nv)."""
+    model = state.body.model
+    out = np.zeros((len(JOINT_NAMES), 3, model.nv))
+    for J, frame, x in zip(out, state.body.joint_frames, state.joint_positions_world, strict=True):
+        for ancestor in list(model.supports[int(model.frames[int(frame)].parentJoint)])[1:]:
+            j = model.joints[ancestor]
+            k = slice(j.idx_v, j.idx_v + j.nv)
+            J[:, k] = state.J_world[:3, k] + np.cross(state.J_world[3:, k].T, x).T
+    return out

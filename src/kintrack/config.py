@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every number of the tracker, with its unit; the command line is derived from these classes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+
+from kintrack.errors import ConfigError
+
+
+def _check(config, **bounds: tuple[float, float]) -> None:
+    for name, (low, high) in bounds.items():
+        value = getattr(config, name)
+        if not (math.isfinite(value) and low <= value <= high):
+            raise ConfigError(
+                f"{type(config).__name__}.{name} = {value!r}: {low:g} to {high:g} are allowed"
+            )
+
+
+@dataclass(frozen=True)
+class AssociationConfig:
+    """How observed points and skin vertices find each other."""
+
+    max_width_px: int = 320
+    """Wider depth images are thinned to at most this width before anything else [px]."""
+    gate_m: float = 0.10
+    """Largest distance between paired vertex and point while tracking [m]."""
+    start_gate_m: float = 0.35
+    """Largest distance in the first rounds of a start [m]."""
+    facing: float = 0.15
+    """Least cosine between a vertex normal and the ray to the camera."""
+    self_occlusion_m: float = 0.03
+    """A vertex further than this behind the body's own depth buffer is hidden [m]."""
+    pixel_pairs: int = 1200
+    """About how many observed pixels look for their vertex."""
+    region_margin_m: float = 0.35
+    """Observed points further than this from the predicted body's box are ignored [m]."""
+
+    def __post_init__(self) -> None:
+        _check(
+            self,
+            max_width_px=(64, 4096),
+            gate_m=(0.01, 1.0),
+            start_gate_m=(0.01, 2.0),
+            facing=(0.0, 1.0),
+            self_occlusion_m=(0.0, 1.0),
+            pixel_pairs=(0, 20_000),
+            region_margin_m=(0.05, 5.0),
+        )
+
+
+@dataclass(frozen=True)
+class SurfaceConfig:
+    """The data term."""
+
+    point_weight: float = 0.2
+    """Weight of point-to-point against point-to-plane."""
+    scale_floor_m: float = 0.008
+    """Least robust scale of the residuals [m]."""
+    scale_ceiling_m: float = 0.03
+    """Largest robust scale of the residuals [m]."""
+    correlation: float = 8.0
+    """How many neighbouring pairs carry the information of one independent pair."""
+
+    def __post_init__(self) -> None:
+        _check(
+            self,
+            point_weight=(0.0, 10.0),
+            scale_floor_m=(1e-4, 0.1),
+            scale_ceiling_m=(1e-3, 1.0),
+            correlation=(1.0, 1e4),
+        )
+
+
+@dataclass(frozen=True)
+class PriorConfig:
+    """What is known before a frame is seen."""
+
+    limb_rad: float = 0.8
+    """Standard deviation of arm and leg hinges about the resting pose [rad]."""
+    trunk_rad: float = 0.3
+    """Standard deviation of spine, neck, head and clavicle hinges about zero [rad]."""
+    twist_rad: float = 0.5
+    """Standard deviation of forearm, wrist and ankle hinges about zero [rad]."""
+
+    def __post_init__(self) -> None:
+        _check(self, limb_rad=(0.01, 10), trunk_rad=(0.01, 10), twist_rad=(0.01, 10))
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """Constant-velocity prediction."""
+
+    root_m_s: float = 1.5
+    """Standard deviation of the root's unpredicted speed [m/s]."""
+    root_rad_s: float = 3.0
+    """Standard deviation of the root's unpredicted angular speed [rad/s]."""
+    limb_rad_s: float = 8.0
+    """Standard deviation of unpredicted hinge speed in arms and legs [rad/s]."""
+    trunk_rad_s: float = 2.5
+    """Standard deviation of unpredicted hinge speed in trunk, neck and clavicles [rad/s]."""
+    damping: float = 0.7
+    """Share of the last velocity that is carried on."""
+
+    def __post_init__(self) -> None:
+        _check(
+            self,
+            root_m_s=(1e-3, 100),
+            root_rad_s=(1e-3, 100),
+            limb_rad_s=(1e-3, 200),
+            trunk_rad_s=(1e-3, 200),
+            damping=(0, 1),
+        )
+
+
+@dataclass(frozen=True)
+class SolverConfig:
+    """Damped Gauss-Newton."""
+
+    rounds: int = 6
+    """Associations per frame at most."""
+    steps: int = 2
+    """Accepted steps per association at most."""
+    damping: float = 1e-3
+    """First Levenberg damping, relative to the diagonal."""
+    tolerance_m: float = 0.001
+    """Stop when no reported joint moves further than this in a round [m]."""
+
+    def __post_init__(self) -> None:
+        _check(
+            self, rounds=(1, 100), steps=(1, 100), damping=(0, 1e6), tolerance_m=(0, 1)
+        )
+
+
+@dataclass(frozen=True)
+class StartConfig:
+    """The first start: one roughly upright person, no clutter."""
+
+    min_height_m: float = 0.7
+    """Smallest blob that can be a person [m]."""
+    max_height_m: float = 2.3
+    """Tallest blob that can be a person [m]."""
+    max_distance_m: float = 6.0
+    """Blobs further away are ignored [m]."""
+    rounds: int = 14
+    """Associations per guess."""
+
+    def __post_init__(self) -> None:
+        _check(
+            self,
+            min_height_m=(0.2, 2.5),
+            max_height_m=(0.3, 4.0),
+            max_distance_m=(0.3, 30.0),
+            rounds=(1, 200),
+        )
+        if self.min_height_m >= self.max_height_m:
+            raise ConfigError(
+                f"StartConfig.min_height_m = {self.min_height_m!r}: must be below "
+                f"max_height_m = {self.max_height_m!r}"
+            )
+
+
+@dataclass(frozen=True)
+class JudgeConfig:
+    """When a fit counts as tracking."""
+
+    max_rms_m: float = 0.03
+    """Largest residual of a frame that is tracking [m]."""
+    min_explained: float = 0.75
+    """Least share of the observed region within `explained_m` of the skin."""
+    min_supported: float = 0.45
+    """Least share of the facing skin with an observed point within `explained_m`."""
+    explained_m: float = 0.06
+    """Distance at which a point explains the skin and the reverse [m]."""
+    patience: int = 3
+    """Bad frames in a row before the track is lost."""
+
+    def __post_init__(self) -> None:
+        _check(
+            self,
+            max_rms_m=(1e-3, 1),
+            min_explained=(0, 1),
+            min_supported=(0, 1),
+            explained_m=(1e-3, 1),
+            patience=(1, 1000),
+        )
+
+
+@dataclass(frozen=True)
+class TrackerConfig:
+    """The whole tracker."""
+
+    association: AssociationConfig = field(default_factory=AssociationConfig)
+    """Pairs of points and vertices."""
+    surface: SurfaceConfig = field(default_factory=SurfaceConfig)
+    """Data term."""
+    prior: PriorConfig = field(default_factory=PriorConfig)
+    """Pose prior."""
+    motion: MotionConfig = field(default_factory=MotionConfig)
+    """Prediction."""
+    solver: SolverConfig = field(default_factory=SolverConfig)
+    """Gauss-Newton."""
+    start: StartConfig = field(default_factory=StartConfig)
+    """First start."""
+    judge: JudgeConfig = field(default_factory=JudgeConfig)
+    """Status."""
+
+
+def to_dict(config) -> dict:
+    """The configuration as plain numbers, for `summary.json`."""
+    return {
+        f.name: to_dict(value) if hasattr(value := getattr(config, f.name), "__post_init__")
+        or isinstance(value, TrackerConfig) else value
+        for f in fields(config)
+    }
