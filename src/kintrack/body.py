@@ -63,6 +63,10 @@ class Body:
     """Lower bound per velocity component [rad]; -inf for the root."""
     upper: Float[ndarray, " nv"]
     """Upper bound per velocity component [rad]; inf for the root."""
+    joint_support: Bool[ndarray, "j nv"]
+    """True where a velocity component moves a reported joint."""
+    scratch: pin.Data
+    """Work space of `run_kinematics`; what it computes is copied out."""
 
     @property
     def nq(self) -> int:
@@ -203,18 +207,33 @@ def load_body(folder: Path | None = None, shape: Float[ndarray, " k"] | None = N
     if shape is not None:
         _move_origins(model, rig, load_rig(folder))
     joints = np.array([model.frames[model.getFrameId(n)].parentJoint for n in names])
-    support = np.zeros((len(names), model.nv), dtype=bool)
-    for row, joint in zip(support, joints, strict=True):
-        for ancestor in list(model.supports[int(joint)])[1:]:
-            j = model.joints[ancestor]
-            row[j.idx_v : j.idx_v + j.nv] = True
     lower = np.full(model.nv, -np.inf)
     upper = np.full(model.nv, np.inf)
     for joint in list(model.joints)[2:]:
         lower[joint.idx_v] = model.lowerPositionLimit[joint.idx_q]
         upper[joint.idx_v] = model.upperPositionLimit[joint.idx_q]
     frames = np.array([model.getFrameId(FRAME_OF_JOINT[name]) for name in JOINT_NAMES])
-    return Body(model, names, joints, support, frames, lower, upper)
+    return Body(
+        model=model,
+        link_names=names,
+        link_joints=joints,
+        support=_support(model, joints),
+        joint_frames=frames,
+        lower=lower,
+        upper=upper,
+        joint_support=_support(model, [model.frames[int(f)].parentJoint for f in frames]),
+        scratch=model.createData(),
+    )
+
+
+def _support(model: pin.Model, joints) -> Bool[ndarray, "n nv"]:
+    """True where a velocity component moves what hangs on a joint."""
+    support = np.zeros((len(joints), model.nv), dtype=bool)
+    for row, joint in zip(support, joints, strict=True):
+        for ancestor in list(model.supports[int(joint)])[1:]:
+            j = model.joints[ancestor]
+            row[j.idx_v : j.idx_v + j.nv] = True
+    return support
 
 
 def _move_origins(model: pin.Model, rig: Rig, average: Rig) -> None:
@@ -260,23 +279,22 @@ def run_kinematics(body: Body, q: Float[ndarray, " nq"]) -> BodyState:
     Returns:
         A state whose poses are current.
     """
-    model, data = body.model, body.model.createData()
+    model, data = body.model, body.scratch
     J_world = pin.computeJointJacobians(model, data, q)
     pin.updateFramePlacements(model, data)
     Ts = np.empty((len(body.link_joints), 4, 4))
     for T, joint in zip(Ts, body.link_joints, strict=True):
         T[:] = data.oMi[int(joint)].homogeneous
     positions = np.array([data.oMf[int(frame)].translation for frame in body.joint_frames])
-    return BodyState(body, np.array(q), Ts, np.ascontiguousarray(J_world), positions)
+    return BodyState(body, np.array(q), Ts, np.array(J_world, order="C"), positions)
 
 
 def joint_jacobians(state: BodyState) -> Float[ndarray, "j 3 nv"]:
     """Derivative of the reported joint centres with respect to v, world frame, shape (J, 3, nv)."""
-    model = state.body.model
-    out = np.zeros((len(JOINT_NAMES), 3, model.nv))
-    for J, frame, x in zip(out, state.body.joint_frames, state.joint_positions_world, strict=True):
-        for ancestor in list(model.supports[int(model.frames[int(frame)].parentJoint)])[1:]:
-            j = model.joints[ancestor]
-            k = slice(j.idx_v, j.idx_v + j.nv)
-            J[:, k] = state.J_world[:3, k] + np.cross(state.J_world[3:, k].T, x).T
-    return out
+    lin, ang = state.J_world[:3], state.J_world[3:]
+    x = state.joint_positions_world
+    turned = ang[_NEXT][None] * x[:, _AFTER, None] - ang[_AFTER][None] * x[:, _NEXT, None]
+    return np.where(state.body.joint_support[:, None, :], lin[None] + turned, 0.0)
+
+
+_NEXT, _AFTER = [1, 2, 0], [2, 0, 1]

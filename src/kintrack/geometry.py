@@ -82,9 +82,11 @@ class PinholeCamera:
             Points in the camera frame [m], shape (height, width, 3).
         """
         z = np.where(np.isfinite(depth_m) & (depth_m > 0), depth_m, 0.0)
-        u = (np.arange(self.width) - self.cx) / self.fx
-        v = (np.arange(self.height) - self.cy) / self.fy
-        return np.stack([u[None, :] * z, v[:, None] * z, z], axis=-1)
+        points = np.empty((*z.shape, 3))
+        points[..., 2] = z
+        np.multiply((np.arange(self.width) - self.cx) / self.fx, z, out=points[..., 0])
+        np.multiply(((np.arange(self.height) - self.cy) / self.fy)[:, None], z, out=points[..., 1])
+        return points
 
     def scaled(self, factor: int) -> PinholeCamera:
         """The camera whose pixel (i, j) is this one's pixel (i * factor, j * factor)."""

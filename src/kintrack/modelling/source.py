@@ -121,7 +121,10 @@ def _summarise(vertices, heads, bones, faces, bone_weights, components) -> Sourc
     tree = links()
     weights = bone_weights @ bone_link_matrix(bones, tree)
     weights /= weights.sum(axis=1, keepdims=True)
-    points = _points(vertices, heads, bones, weights, tree)
+    points = _points(heads, bones, tree)
+    skull = weights[:, [link.name for link in tree].index("head")] > 0.99
+    area = np.where(skull, _vertex_areas(vertices.mean(axis=0), faces), 0)
+    points["head_center"] = np.tensordot(vertices, area / area.sum(), (1, 0))
     origin = points["pelvis"].copy()
     vertices = vertices - origin[:, None]
     points = {name: p - origin for name, p in points.items()}
@@ -156,8 +159,15 @@ def _summarise(vertices, heads, bones, faces, bone_weights, components) -> Sourc
     )
 
 
-def _points(vertices, heads, bones, weights, tree) -> dict[str, Float[ndarray, "n 3"]]:
-    """Link origins and extra points of every person, all linear in the source body."""
+def _vertex_areas(vertices, faces) -> Float[ndarray, " v"]:
+    """A third of the area of each vertex's triangles [m^2]."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6
+    return np.bincount(faces.ravel(), np.repeat(area, 3), minlength=len(vertices))
+
+
+def _points(heads, bones, tree) -> dict[str, Float[ndarray, "n 3"]]:
+    """Link origins, hands and toes of every person, all linear in the source body."""
 
     def bone(name: str):
         return heads[:, bones.index(name)]
@@ -172,8 +182,6 @@ def _points(vertices, heads, bones, weights, tree) -> dict[str, Float[ndarray, "
             points[link.name] = 0.5 * (bone("lowerarm01" + tag) + bone("wrist" + tag))
         else:
             points[link.name] = bone(_ORIGIN_BONE[stem] + tag)
-    skull = weights[:, [link.name for link in tree].index("head")] > 0.99
-    points["head_center"] = vertices[:, skull].mean(axis=1)
     for side in "lr":
         tag = "." + side.upper()
         points[f"{side}_hand_center"] = 0.5 * (bone("wrist" + tag) + bone("finger3-1" + tag))

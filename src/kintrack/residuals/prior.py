@@ -16,7 +16,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.body import BodyState
-from kintrack.residuals.linearization import Linearization
+from kintrack.residuals.linearization import Linearization, Quadratic, quadratic_of
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,10 @@ class TangentPrior:
         dq = pin.dDifference(model, self.q0, state.q, pin.ArgumentPosition.ARG1)
         r = self._residual(state)
         return Linearization(r, self.root.T @ dq, np.ones(len(r)))
+
+    def quadratic(self, state: BodyState) -> Quadratic:
+        """J^T J, J^T r and the cost."""
+        return quadratic_of(self.linearize(state))
 
     def cost(self, state: BodyState) -> float:
         """Half the squared norm of the residual."""

@@ -19,7 +19,7 @@ from kintrack.body import BodyState
 from kintrack.config import SurfaceConfig
 from kintrack.errors import AssociationError
 from kintrack.geometry import robust_scale, tukey_weights
-from kintrack.residuals.linearization import Linearization
+from kintrack.residuals.linearization import Linearization, Quadratic
 from kintrack.skin import Skin, skinned_vertices, vertex_jacobians
 
 
@@ -53,10 +53,29 @@ class SurfaceResidual:
         J = _apply_rows(self.roots, vertex_jacobians(state, self.skin, self.vertex))
         return Linearization(r.ravel(), J.reshape(r.size, -1), np.repeat(self.weights, 3))
 
+    def quadratic(self, state: BodyState) -> Quadratic:
+        """J^T W J by way of the links, without forming J.
+
+        A vertex moves by sum_b w_b [I, -[x_b]x] J_b, J_b the motion of link b, so
+        H = sum_bc J_b^T M_bc J_c with 6x6 blocks M_bc summed over the pairs.
+        """
+        body = state.body
+        rows = (self.skin.links[self.vertex], self.skin.weights[self.vertex])
+        points = self.skin.points_link[self.vertex]
+        M, h, cost = _link_blocks(
+            state.Ts_world_link, *rows, points, self.points_world, self.roots, self.weights
+        )
+        J = (body.support[:, None, :] * state.J_world[None]).reshape(-1, body.nv)
+        n = len(J)
+        return Quadratic(J.T @ (M.transpose(0, 2, 1, 3).reshape(n, n) @ J), h.reshape(n) @ J, cost)
+
     def cost(self, state: BodyState) -> float:
         """0.5 sum_i w_i |A_i d_i|^2."""
-        r = _apply(self.roots, self._offsets(state))
-        return 0.5 * float(self.weights @ (r * r).sum(axis=1))
+        skin, v = self.skin, self.vertex
+        return _cost(
+            state.Ts_world_link, skin.links, skin.weights, skin.points_link, v,
+            self.points_world, self.roots, self.weights,
+        )
 
 
 def surface_residual(
@@ -125,3 +144,89 @@ def _apply_rows(A, J):
                     A[i, r, 0] * J[i, 0, k] + A[i, r, 1] * J[i, 1, k] + A[i, r, 2] * J[i, 2, k]
                 )
     return out
+
+
+@njit(cache=True)
+def _cost(Ts, links, skin_weights, points, vertex, observed, A, weights):
+    total = 0.0
+    d = np.empty(3)
+    for i in range(vertex.shape[0]):
+        if weights[i] == 0.0:
+            continue
+        k = vertex[i]
+        for r in range(3):
+            d[r] = -observed[i, r]
+        for b in range(4):
+            w = skin_weights[k, b]
+            if w == 0.0:
+                continue
+            T = Ts[links[k, b]]
+            p = points[k, b]
+            for r in range(3):
+                d[r] += w * (T[r, 0] * p[0] + T[r, 1] * p[1] + T[r, 2] * p[2] + T[r, 3])
+        for r in range(3):
+            e = A[i, r, 0] * d[0] + A[i, r, 1] * d[1] + A[i, r, 2] * d[2]
+            total += weights[i] * e * e
+    return 0.5 * total
+
+
+@njit(cache=True)
+def _link_blocks(Ts, links, skin_weights, points, observed, A, weights):
+    """M_bc (L, L, 6, 6), the links' gradient h (L, 6) and the cost, summed over the pairs."""
+    count = Ts.shape[0]
+    M = np.zeros((count, count, 6, 6))
+    h = np.zeros((count, 6))
+    cost = 0.0
+    x = np.empty((4, 3))
+    K = np.empty((4, 3, 6))
+    d = np.empty(3)
+    e = np.empty(3)
+    for i in range(links.shape[0]):
+        if weights[i] == 0.0:
+            continue
+        for r in range(3):
+            d[r] = -observed[i, r]
+        for b in range(4):
+            w = skin_weights[i, b]
+            if w == 0.0:
+                continue
+            T = Ts[links[i, b]]
+            p = points[i, b]
+            for r in range(3):
+                x[b, r] = T[r, 0] * p[0] + T[r, 1] * p[1] + T[r, 2] * p[2] + T[r, 3]
+                d[r] += w * x[b, r]
+        for r in range(3):
+            e[r] = A[i, r, 0] * d[0] + A[i, r, 1] * d[1] + A[i, r, 2] * d[2]
+            cost += 0.5 * weights[i] * e[r] * e[r]
+        for b in range(4):
+            w = skin_weights[i, b]
+            if w == 0.0:
+                continue
+            for r in range(3):
+                a0, a1, a2 = w * A[i, r, 0], w * A[i, r, 1], w * A[i, r, 2]
+                K[b, r, 0], K[b, r, 1], K[b, r, 2] = a0, a1, a2
+                K[b, r, 3] = x[b, 1] * a2 - x[b, 2] * a1
+                K[b, r, 4] = x[b, 2] * a0 - x[b, 0] * a2
+                K[b, r, 5] = x[b, 0] * a1 - x[b, 1] * a0
+        for b in range(4):
+            if skin_weights[i, b] == 0.0:
+                continue
+            lb = links[i, b]
+            for m in range(6):
+                h[lb, m] += weights[i] * (K[b, 0, m] * e[0] + K[b, 1, m] * e[1] + K[b, 2, m] * e[2])
+            for c in range(4):
+                if skin_weights[i, c] == 0.0 or links[i, c] < lb:
+                    continue
+                block = M[lb, links[i, c]]
+                for m in range(6):
+                    k0, k1, k2 = (
+                        weights[i] * K[b, 0, m], weights[i] * K[b, 1, m], weights[i] * K[b, 2, m],
+                    )
+                    for n in range(6):
+                        block[m, n] += k0 * K[c, 0, n] + k1 * K[c, 1, n] + k2 * K[c, 2, n]
+    for a in range(count):
+        for b in range(a + 1, count):
+            for m in range(6):
+                for n in range(6):
+                    M[b, a, n, m] = M[a, b, m, n]
+    return M, h, cost

@@ -42,11 +42,10 @@ def normal_equations(
     nv = state.body.nv
     H, g, cost = np.zeros((nv, nv)), np.zeros(nv), 0.0
     for residual in residuals:
-        r, J, w = residual.linearize(state)
-        WJ = w[:, None] * J
-        H += J.T @ WJ
-        g += r @ WJ
-        cost += 0.5 * float(r @ (w * r))
+        term = residual.quadratic(state)
+        H += term.H
+        g += term.g
+        cost += term.cost
     return H, g, cost
 
 

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How well a posed skin and an observation explain each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+from scipy.spatial import cKDTree
+
+from kintrack.association.observation import Observation
+from kintrack.association.window import sample_region
+from kintrack.config import JudgeConfig
+from kintrack.fit import View
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Coverage in both directions."""
+
+    explained: float
+    """Share of the observed region that lies near the visible skin, 0 to 1."""
+    supported: float
+    """Share of the visible skin that has an observed point near it, 0 to 1."""
+    vertex_supported: Bool[ndarray, " v"]
+    """Visible vertices with an observed point near them."""
+
+
+def agreement(view: View, observation: Observation, explained_m: float) -> Agreement:
+    """Compare a view of the skin with what was observed.
+
+    Args:
+        view: The skin seen by the camera.
+        observation: Region that may be the person.
+        explained_m: Distance that counts as near [m].
+
+    Returns:
+        Shares, 0 where there is nothing to compare.
+    """
+    points = sample_region(observation, 1500)
+    index = np.flatnonzero(view.visible)
+    supported = np.zeros(len(view.visible), dtype=bool)
+    if len(points) == 0 or len(index) == 0:
+        return Agreement(0.0, 0.0, supported)
+    skin = view.vertices_camera[index]
+    to_skin = cKDTree(skin).query(points, distance_upper_bound=explained_m)[0]
+    to_points = cKDTree(points).query(skin, distance_upper_bound=explained_m)[0]
+    supported[index] = np.isfinite(to_points)
+    return Agreement(
+        float(np.isfinite(to_skin).mean()), float(np.isfinite(to_points).mean()), supported
+    )
+
+
+def acceptable(agreed: Agreement, rms_m: float, config: JudgeConfig) -> bool:
+    """True if a frame counts as tracking by residual and coverage."""
+    return (
+        rms_m <= config.max_rms_m
+        and agreed.explained >= config.min_explained
+        and agreed.supported >= config.min_supported
+    )
+
+
+def joint_visibility(
+    view: View,
+    supported: Bool[ndarray, " v"],
+    joint_positions_camera: Float[ndarray, "j 3"],
+    radius_m: float = 0.13,
+) -> Float[ndarray, " j"]:
+    """Share of the camera-facing skin around each joint that was observed, shape (J,)."""
+    rays = view.vertices_camera / np.linalg.norm(view.vertices_camera, axis=1, keepdims=True)
+    facing = np.einsum("ij,ij->i", view.normals_camera, rays) < -0.15
+    d2 = (
+        (view.vertices_camera**2).sum(axis=1)
+        - 2 * joint_positions_camera @ view.vertices_camera.T
+        + (joint_positions_camera**2).sum(axis=1)[:, None]
+    )
+    near = (d2 < radius_m**2) & facing
+    return (near & supported).sum(axis=1) / np.maximum(near.sum(axis=1), 1)

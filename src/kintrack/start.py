@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The first start: one roughly upright person, no clutter.
+
+The nearest person-sized blob of the depth image is found, the body is put there in a few postures
+and headings, each guess is fitted, and the one that explains the blob best is kept. Depth alone
+barely tells a chest from a back, so of two equally good guesses the one facing the camera wins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numba import njit
+from numpy import ndarray
+
+from kintrack.association.observation import Observation
+from kintrack.body import run_kinematics
+from kintrack.config import StartConfig, TrackerConfig
+from kintrack.errors import AssociationError
+from kintrack.fit import Fit, fit_pose, view_skin
+from kintrack.geometry import invert_rigid, transform_points
+from kintrack.human import RESTING_DEG, SITTING_DEG, Human, posed, prior_sigma
+from kintrack.judge import Agreement, agreement
+from kintrack.residuals.prior import diagonal_prior
+from kintrack.skin import skinned_vertices
+
+HEADINGS_DEG = (0.0, -50.0, 50.0)
+"""Guesses of where the chest points, 0 = at the camera [deg]."""
+POSTURES = (RESTING_DEG, SITTING_DEG)
+"""Guesses of the posture."""
+EDGE_M = 0.12
+"""Depth step between neighbouring cells that parts two things [m]."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """The best guess of a start."""
+
+    fit: Fit
+    """Fitted pose."""
+    agreed: Agreement
+    """How well it explains the blob."""
+    observation: Observation
+    """The observation, its region the blob."""
+
+
+def find_person(
+    observation: Observation, T_world_camera: Float[ndarray, "4 4"], config: StartConfig
+) -> Bool[ndarray, "h w"] | None:
+    """Mask of the nearest blob that has a person's height and width.
+
+    Args:
+        observation: All points.
+        T_world_camera: Camera pose; heights are along the world's z.
+        config: What counts as a person.
+
+    Returns:
+        Mask at working resolution, or None if there is no such blob.
+    """
+    cell = max(1, observation.camera.width // 160)
+    points = observation.points_camera[::cell, ::cell]
+    valid = observation.region[::cell, ::cell] & (points[..., 2] <= config.max_distance_m)
+    blob = _components(points[..., 2], valid, EDGE_M)
+    best, best_distance = -1, np.inf
+    sizes = np.bincount(blob[blob >= 0], minlength=1) if (blob >= 0).any() else np.zeros(0)
+    for i in np.flatnonzero(sizes >= 60):
+        p = points[blob == i]
+        world = transform_points(T_world_camera, p)
+        height = np.ptp(np.quantile(world[:, 2], [0.01, 0.99]))
+        distance = float(np.median(p[:, 2]))
+        across = np.ptp(np.quantile(p[:, 0], [0.02, 0.98]))
+        fits = config.min_height_m <= height <= config.max_height_m and 0.2 <= across <= 2.2
+        if fits and distance < best_distance:
+            best, best_distance = i, distance
+    if best < 0:
+        return None
+    mask = np.repeat(np.repeat(blob == best, cell, axis=0), cell, axis=1)
+    h, w = observation.region.shape
+    return mask[:h, :w] & observation.region
+
+
+def start(
+    human: Human,
+    observation: Observation,
+    T_world_camera: Float[ndarray, "4 4"],
+    config: TrackerConfig,
+) -> Start | None:
+    """Find a person and fit the body from several guesses.
+
+    Args:
+        human: Body and skin.
+        observation: All points.
+        T_world_camera: Camera pose.
+        config: All weights.
+
+    Returns:
+        The best start, or None if nobody is in view.
+    """
+    mask = find_person(observation, T_world_camera, config.start)
+    if mask is None:
+        return None
+    seen = Observation(observation.camera, observation.points_camera, mask)
+    T_camera_world = invert_rigid(T_world_camera)
+    gates = np.geomspace(
+        config.association.start_gate_m, config.association.gate_m, config.start.rounds
+    )
+    best, best_score = None, -np.inf
+    for posture in POSTURES:
+        for heading in HEADINGS_DEG:
+            q = _placed(human, seen, T_world_camera, posture, np.radians(heading))
+            prior = diagonal_prior(q, prior_sigma(human.body, config.prior))
+            try:
+                fit = fit_pose(human, seen, q, [prior], T_world_camera, config, gates)
+            except AssociationError:
+                continue
+            view = view_skin(human, fit.state, T_camera_world, seen, config)
+            agreed = agreement(view, seen, config.judge.explained_m)
+            score = agreed.explained + agreed.supported - fit.surface.rms_m / 0.03
+            score -= 0.02 * abs(heading) / 50 + prior.cost(fit.state) / 500
+            if score > best_score:
+                best, best_score = Start(fit, agreed, seen), score
+    return best
+
+
+def _placed(human, seen: Observation, T_world_camera, posture, heading_rad) -> ndarray:
+    """The posture standing where the blob is: top of the head at the top of the blob."""
+    points = transform_points(T_world_camera, seen.points_camera[seen.region])
+    q = posed(human.body, posture)
+    vertices = skinned_vertices(run_kinematics(human.body, q), human.skin)
+    viewpoint = T_world_camera[:3, 3]
+    centre = np.median(points, axis=0)
+    away = centre - viewpoint
+    away[2] = 0
+    away /= np.linalg.norm(away)
+    yaw = np.arctan2(-away[1], -away[0]) + heading_rad
+    q[:3] = centre + 0.1 * away
+    q[2] = np.quantile(points[:, 2], 0.995) - vertices[:, 2].max()
+    q[3:7] = [0, 0, np.sin(yaw / 2), np.cos(yaw / 2)]
+    return q
+
+
+@njit(cache=True)
+def _components(z, valid, edge):
+    """Connected cells whose depth differs by less than `edge`, numbered from 0; -1 elsewhere."""
+    h, w = z.shape
+    out = np.full((h, w), -1, dtype=np.int64)
+    stack = np.empty((h * w, 2), dtype=np.int64)
+    count = 0
+    for i in range(h):
+        for j in range(w):
+            if not valid[i, j] or out[i, j] >= 0:
+                continue
+            out[i, j] = count
+            stack[0, 0], stack[0, 1] = i, j
+            top = 1
+            while top > 0:
+                top -= 1
+                a, b = stack[top, 0], stack[top, 1]
+                for da, db in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+                    c, d = a + da, b + db
+                    if c < 0 or d < 0 or c >= h or d >= w:
+                        continue
+                    if not valid[c, d] or out[c, d] >= 0 or abs(z[c, d] - z[a, b]) > edge:
+                        continue
+                    out[c, d] = count
+                    stack[top, 0], stack[top, 1] = c, d
+                    top += 1
+            count += 1
+    return out

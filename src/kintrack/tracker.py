@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The method on one screen: predict, observe, associate and solve, judge, report [Wan19, 4]."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from kintrack.association.observation import Observation, observe, within
+from kintrack.body import joint_jacobians, run_kinematics
+from kintrack.config import TrackerConfig
+from kintrack.errors import AssociationError
+from kintrack.fit import Fit, fit_pose, view_skin
+from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
+from kintrack.human import RESTING_DEG, Human, load_human, motion_sigma, posed, prior_sigma
+from kintrack.joints import JOINT_NAMES
+from kintrack.judge import acceptable, agreement, joint_visibility
+from kintrack.residuals.prior import diagonal_prior, gaussian_prior
+from kintrack.result import FrameResult
+from kintrack.sequence.frame import Frame
+from kintrack.skin import skinned_vertices
+from kintrack.solver.gauss_newton import normal_equations
+from kintrack.start import start
+
+
+@dataclass(frozen=True)
+class Belief:
+    """Where the body is thought to be between frames."""
+
+    q: Float[ndarray, " nq"]
+    """Configuration."""
+    velocity: Float[ndarray, " nv"]
+    """Tangent velocity [m/s, rad/s]."""
+    covariance: Float[ndarray, "nv nv"]
+    """Covariance in the tangent space at q."""
+    timestamp_s: float
+    """When [s]."""
+    misses: int = 0
+    """Bad frames in a row."""
+
+
+class Tracker:
+    """Follows one person through the frames of one camera."""
+
+    def __init__(
+        self,
+        config: TrackerConfig | None = None,
+        human: Human | None = None,
+        T_world_camera: Float[ndarray, "4 4"] = T_LEVEL_WORLD_CAMERA,
+        clock: Callable[[str], None] = lambda stage: None,
+    ):
+        """Set up a tracker that has seen nothing yet.
+
+        Args:
+            config: All weights; the defaults if None.
+            human: Body and skin; the average adult if None.
+            T_world_camera: Camera pose; a level camera if not given.
+            clock: Called after each stage with its name, for benchmarks.
+        """
+        self.config = TrackerConfig() if config is None else config
+        self.human = load_human() if human is None else human
+        self.T_world_camera = T_world_camera
+        self.belief: Belief | None = None
+        self._clock = clock
+        resting = posed(self.human.body, RESTING_DEG)
+        self._pose_prior = diagonal_prior(resting, prior_sigma(self.human.body, self.config.prior))
+
+    def step(self, frame: Frame) -> FrameResult:
+        """Fit the body to the next frame.
+
+        Args:
+            frame: The next frame in time; one with a problem is skipped.
+
+        Returns:
+            Pose, joints, covariances and status.
+        """
+        began = time.perf_counter()
+        if frame.problem is not None or frame.depth_m is None:
+            return self._nothing(frame, "skipped", began, frame.problem or "no depth")
+        observation = observe(frame, self.config.association.max_width_px)
+        if self.belief is None:
+            return self._start(frame, observation, began)
+        config, body = self.config, self.human.body
+        predicted, covariance = self._predict(self.belief, frame.timestamp_s)
+        observation = within(observation, self._box(predicted))
+        self._clock("observe")
+        priors = [gaussian_prior(predicted, covariance), self._pose_prior]
+        gates = [config.association.gate_m] * config.solver.rounds
+        try:
+            fit = fit_pose(
+                self.human, observation, predicted, priors, self.T_world_camera, config, gates,
+                self._clock,
+            )
+        except AssociationError:
+            return self._miss(frame, began)
+        return self._report(frame, observation, fit, priors, began)
+
+    def _start(self, frame: Frame, observation: Observation, began: float) -> FrameResult:
+        """First frame, or the first after a loss: find the person and fit from several guesses."""
+        found = start(self.human, observation, self.T_world_camera, self.config)
+        self._clock("start")
+        if found is None or not acceptable(
+            found.agreed, found.fit.surface.rms_m, self.config.judge
+        ):
+            return self._nothing(frame, "initialising", began)
+        return self._report(frame, found.observation, found.fit, [self._pose_prior], began)
+
+    def _predict(self, belief: Belief, timestamp_s: float) -> tuple[ndarray, ndarray]:
+        """Constant velocity within the limits, and how sure it is."""
+        body, motion = self.human.body, self.config.motion
+        dt = max(timestamp_s - belief.timestamp_s, 1e-3)
+        q = body.integrate(belief.q, belief.velocity * motion.damping * dt)
+        q[7:] = np.clip(q[7:], body.lower[6:], body.upper[6:])
+        return q, belief.covariance + np.diag(motion_sigma(body, motion, dt) ** 2)
+
+    def _box(self, q: Float[ndarray, " nq"]) -> Float[ndarray, "2 3"]:
+        """Camera-frame box around the predicted skin, grown by the region's margin [m]."""
+        state = run_kinematics(self.human.body, q)
+        vertices = transform_points(
+            invert_rigid(self.T_world_camera), skinned_vertices(state, self.human.skin)
+        )
+        margin = self.config.association.region_margin_m
+        return np.stack([vertices.min(axis=0) - margin, vertices.max(axis=0) + margin])
+
+    def _report(
+        self, frame: Frame, observation: Observation, fit: Fit, priors: list, began: float
+    ) -> FrameResult:
+        """Judge the fit, update the belief, and say how sure every joint is."""
+        config, body = self.config, self.human.body
+        T_camera_world = invert_rigid(self.T_world_camera)
+        view = view_skin(self.human, fit.state, T_camera_world, observation, config)
+        agreed = agreement(view, observation, config.judge.explained_m)
+        good = acceptable(agreed, fit.surface.rms_m, config.judge)
+        H, _, _ = normal_equations(fit.state, [fit.surface, *priors])
+        covariance = np.linalg.inv(H + 1e-9 * np.eye(body.nv))
+        self.belief = self._update(fit, covariance, frame.timestamp_s, good)
+        R = T_camera_world[:3, :3]
+        J = R @ joint_jacobians(fit.state)
+        positions = transform_points(T_camera_world, fit.state.joint_positions_world)
+        result = FrameResult(
+            timestamp_s=frame.timestamp_s,
+            status="tracking" if self.belief is not None else "lost",
+            q=fit.state.q,
+            joint_positions_camera_m=positions,
+            joint_covariances_m2=J @ covariance @ J.transpose(0, 2, 1),
+            joint_visible=joint_visibility(view, agreed.vertex_supported, positions),
+            residual_rms_m=fit.surface.rms_m,
+            inliers=fit.surface.inliers,
+            milliseconds=1e3 * (time.perf_counter() - began),
+            iterations=fit.iterations,
+        )
+        self._clock("report")
+        return result
+
+    def _update(self, fit: Fit, covariance: ndarray, timestamp_s: float, good: bool):
+        """The belief after a frame; None once too many bad frames came in a row."""
+        body, last = self.human.body, self.belief
+        if last is None:
+            return Belief(fit.state.q, np.zeros(body.nv), covariance, timestamp_s)
+        misses = 0 if good else last.misses + 1
+        if misses >= self.config.judge.patience:
+            return None
+        dt = max(timestamp_s - last.timestamp_s, 1e-3)
+        velocity = body.difference(last.q, fit.state.q) / dt
+        return Belief(fit.state.q, velocity, covariance, timestamp_s, misses)
+
+    def _miss(self, frame: Frame, began: float) -> FrameResult:
+        """Nothing of the person was seen: forget him."""
+        self.belief = None
+        return self._nothing(frame, "lost", began)
+
+    def _nothing(
+        self, frame: Frame, status: str, began: float, reason: str | None = None
+    ) -> FrameResult:
+        """A result without a pose."""
+        n = len(JOINT_NAMES)
+        return FrameResult(
+            timestamp_s=frame.timestamp_s,
+            status=status,
+            q=np.full(self.human.body.nq, np.nan),
+            joint_positions_camera_m=np.full((n, 3), np.nan),
+            joint_covariances_m2=np.full((n, 3, 3), np.nan),
+            joint_visible=np.zeros(n),
+            residual_rms_m=float("nan"),
+            inliers=0,
+            milliseconds=1e3 * (time.perf_counter() - began),
+            reason=reason,
+        )
