@@ -24,8 +24,12 @@ class AssociationConfig:
 
     max_width_px: int = 320
     """Wider depth images are thinned to at most this width before anything else [px]."""
-    gate_m: float = 0.10
-    """Largest distance between paired vertex and point while tracking [m]."""
+    gate_m: float = 0.05
+    """Largest distance between a vertex and the point it takes [m]."""
+    first_gate_m: float = 0.4
+    """Largest distance between a point and the vertex it takes in a frame's first round [m]."""
+    last_gate_m: float = 0.10
+    """The same in the last round [m]."""
     start_gate_m: float = 0.35
     """Largest distance in the first rounds of a start [m]."""
     facing: float = 0.15
@@ -42,6 +46,8 @@ class AssociationConfig:
             self,
             max_width_px=(64, 4096),
             gate_m=(0.01, 1.0),
+            first_gate_m=(0.01, 2.0),
+            last_gate_m=(0.01, 2.0),
             start_gate_m=(0.01, 2.0),
             facing=(0.0, 1.0),
             self_occlusion_m=(0.0, 1.0),
@@ -145,6 +151,10 @@ class StartConfig:
     """Blobs further away are ignored [m]."""
     rounds: int = 14
     """Associations per guess."""
+    shape_coefficients: int = 2
+    """Leading shape coefficients (stature, build) sized at the start; 0 keeps the given body."""
+    shape_limit: float = 2.5
+    """Largest shape coefficient [standard deviations]."""
 
     def __post_init__(self) -> None:
         _check(
@@ -153,12 +163,42 @@ class StartConfig:
             max_height_m=(0.3, 4.0),
             max_distance_m=(0.3, 30.0),
             rounds=(1, 200),
+            shape_coefficients=(0, 10),
+            shape_limit=(0, 5),
         )
         if self.min_height_m >= self.max_height_m:
             raise ConfigError(
                 f"StartConfig.min_height_m = {self.min_height_m!r}: must be below "
                 f"max_height_m = {self.max_height_m!r}"
             )
+
+
+@dataclass(frozen=True)
+class LimbConfig:
+    """The search for limbs that have left their data."""
+
+    candidates: int = 0
+    """Configurations tried per limb; 0 turns the search off."""
+    points: int = 48
+    """Skin vertices that stand for a limb."""
+    pixels: int = 800
+    """About how many observed pixels take part."""
+    explained_m: float = 0.06
+    """Distance at which a point counts as explained [m]."""
+    trigger_m2: float = 0.006
+    """Unexplained area that starts a search, and the gain that a change must bring [m^2]."""
+    seed: int = 0
+    """Seed of the configurations."""
+
+    def __post_init__(self) -> None:
+        _check(
+            self,
+            candidates=(0, 100_000),
+            points=(8, 500),
+            pixels=(50, 20_000),
+            explained_m=(0.01, 1.0),
+            trigger_m2=(0.0, 1.0),
+        )
 
 
 @dataclass(frozen=True)
@@ -203,6 +243,8 @@ class TrackerConfig:
     """Gauss-Newton."""
     start: StartConfig = field(default_factory=StartConfig)
     """First start."""
+    limbs: LimbConfig = field(default_factory=LimbConfig)
+    """Limb search."""
     judge: JudgeConfig = field(default_factory=JudgeConfig)
     """Status."""
 

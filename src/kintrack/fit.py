@@ -95,7 +95,8 @@ def fit_pose(
         view = view_skin(human, state, T_camera_world, observation, config)
         clock("skin")
         pairs = associate(
-            observation, view.vertices_camera, view.visible, gate_m,
+            observation, view.vertices_camera, view.visible,
+            config.association.gate_m, gate_m,
             config.association.pixel_pairs,
         )
         clock("associate")
@@ -106,6 +107,7 @@ def fit_pose(
             transform_points(T_world_camera, view.vertices_camera),
             view.normals_camera @ R.T,
             config.surface,
+            gate_m / 8 if gate_m > config.association.last_gate_m else 0.0,
         )
         before = state.joint_positions_world
         solution = solve(

@@ -42,6 +42,10 @@ class Human:
     """Kinematic tree."""
     skin: Skin
     """Tracking skin."""
+    shape: Float[ndarray, " k"]
+    """Shape coefficients [standard deviations]; empty for the average adult."""
+    folder: Path | None = None
+    """Model folder; None for the one that ships."""
 
 
 def load_human(folder: Path | None = None, shape: Float[ndarray, " k"] | None = None) -> Human:
@@ -57,7 +61,8 @@ def load_human(folder: Path | None = None, shape: Float[ndarray, " k"] | None = 
     Raises:
         ModelError: if a file is missing or broken.
     """
-    return Human(load_body(folder, shape), load_skin("tracking", folder, shape))
+    body, skin = load_body(folder, shape), load_skin("tracking", folder, shape)
+    return Human(body, skin, np.zeros(0) if shape is None else np.array(shape), folder)
 
 
 def posed(body: Body, degrees: dict[str, float]) -> Float[ndarray, " nq"]:

@@ -53,6 +53,26 @@ def agreement(view: View, observation: Observation, explained_m: float) -> Agree
     )
 
 
+def distance_between(view: View, observation: Observation, most_m: float) -> float:
+    """Mean distance between visible skin and observation, both ways, each capped [m].
+
+    Args:
+        view: The skin seen by the camera.
+        observation: Region that may be the person.
+        most_m: Cap of every distance [m].
+
+    Returns:
+        Mean of the two directions' means; the cap where there is nothing to compare.
+    """
+    points = sample_region(observation, 1500)
+    skin = view.vertices_camera[view.visible]
+    if len(points) == 0 or len(skin) == 0:
+        return most_m
+    to_skin = np.minimum(cKDTree(skin).query(points)[0], most_m)
+    to_points = np.minimum(cKDTree(points).query(skin)[0], most_m)
+    return 0.5 * float(to_skin.mean() + to_points.mean())
+
+
 def acceptable(agreed: Agreement, rms_m: float, config: JudgeConfig) -> bool:
     """True if a frame counts as tracking by residual and coverage."""
     return (

@@ -21,8 +21,8 @@ from kintrack.config import StartConfig, TrackerConfig
 from kintrack.errors import AssociationError
 from kintrack.fit import Fit, fit_pose, view_skin
 from kintrack.geometry import invert_rigid, transform_points
-from kintrack.human import RESTING_DEG, SITTING_DEG, Human, posed, prior_sigma
-from kintrack.judge import Agreement, agreement
+from kintrack.human import RESTING_DEG, SITTING_DEG, Human, load_human, posed, prior_sigma
+from kintrack.judge import Agreement, agreement, distance_between
 from kintrack.residuals.prior import diagonal_prior
 from kintrack.skin import skinned_vertices
 
@@ -104,7 +104,7 @@ def start(
     seen = Observation(observation.camera, observation.points_camera, mask)
     T_camera_world = invert_rigid(T_world_camera)
     gates = np.geomspace(
-        config.association.start_gate_m, config.association.gate_m, config.start.rounds
+        config.association.start_gate_m, config.association.last_gate_m, config.start.rounds
     )
     best, best_score = None, -np.inf
     for posture in POSTURES:
@@ -122,6 +122,56 @@ def start(
             if score > best_score:
                 best, best_score = Start(fit, agreed, seen), score
     return best
+
+
+def sized(
+    human: Human,
+    begun: Start,
+    T_world_camera: Float[ndarray, "4 4"],
+    config: TrackerConfig,
+) -> tuple[Human, Start]:
+    """Stature and build of the person, from the frame of the start alone.
+
+    One coefficient after the other is stepped over its range, the pose refitted for each value,
+    and the value with the least capped skin-to-point distance kept, refined by a parabola.
+
+    Args:
+        human: Body of the start.
+        begun: The start.
+        T_world_camera: Camera pose.
+        config: All weights.
+
+    Returns:
+        The sized human and the start refitted with it.
+    """
+    T_camera_world = invert_rigid(T_world_camera)
+    gates = [config.association.last_gate_m] * 4
+    seen = begun.observation
+
+    def refit(shape: ndarray) -> tuple[float, Human, Fit]:
+        person = load_human(human.folder, shape)
+        prior = diagonal_prior(begun.fit.state.q, prior_sigma(person.body, config.prior))
+        fit = fit_pose(person, seen, begun.fit.state.q, [prior], T_world_camera, config, gates)
+        view = view_skin(person, fit.state, T_camera_world, seen, config)
+        spread = 1e-4 * float(shape @ shape)
+        return distance_between(view, seen, config.judge.explained_m) + spread, person, fit
+
+    shape = np.zeros(config.start.shape_coefficients)
+    limit = config.start.shape_limit
+    for k in range(len(shape)):
+        values = np.linspace(-limit, limit, 7)
+        errors = []
+        for value in values:
+            shape[k] = value
+            errors.append(refit(shape)[0])
+        i = int(np.argmin(errors))
+        shape[k] = values[i]
+        if 0 < i < len(values) - 1:
+            a, b, c = errors[i - 1 : i + 2]
+            shape[k] += 0.5 * (a - c) / (a - 2 * b + c) * (values[1] - values[0])
+    _, person, fit = refit(shape)
+    view = view_skin(person, fit.state, T_camera_world, seen, config)
+    return person, Start(fit, agreement(view, seen, config.judge.explained_m), seen)
 
 
 def _placed(human, seen: Observation, T_world_camera, posture, heading_rad) -> ndarray:

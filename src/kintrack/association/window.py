@@ -39,6 +39,7 @@ def associate(
     vertices_camera: Float[ndarray, "v 3"],
     visible: Bool[ndarray, " v"],
     gate_m: float,
+    pixel_gate_m: float,
     pixel_pairs: int,
 ) -> Pairs:
     """Pair skin and observation in both directions.
@@ -47,7 +48,8 @@ def associate(
         observation: Observed points with the region that may be the person.
         vertices_camera: Skin vertices, camera frame [m].
         visible: Vertices that may pair.
-        gate_m: Largest distance of a pair [m].
+        gate_m: Largest distance of a pair found from the skin [m].
+        pixel_gate_m: Largest distance of a pair found from a pixel [m].
         pixel_pairs: About how many pixels look for a vertex; 0 for the paper's one direction.
 
     Returns:
@@ -66,7 +68,7 @@ def associate(
     if pixel_pairs and len(index):
         seen = sample_region(observation, pixel_pairs)
         distance, nearest = cKDTree(vertices_camera[index]).query(
-            seen, distance_upper_bound=gate_m
+            seen, distance_upper_bound=pixel_gate_m
         )
         near = np.isfinite(distance)
         vertex = np.concatenate([vertex, index[nearest[near]]])

@@ -85,6 +85,7 @@ def surface_residual(
     vertices_world: Float[ndarray, "v 3"],
     normals_world: Float[ndarray, "v 3"],
     config: SurfaceConfig,
+    least_scale_m: float = 0.0,
 ) -> SurfaceResidual:
     """Freeze normals and Tukey weights at the current skin.
 
@@ -95,6 +96,7 @@ def surface_residual(
         vertices_world: All vertices now [m].
         normals_world: Their unit normals.
         config: Weights and scale bounds.
+        least_scale_m: Keeps far pairs in play while the gate is still wide [m].
 
     Returns:
         The term.
@@ -108,6 +110,7 @@ def surface_residual(
     d = vertices_world[vertex] - points_world
     plane = np.einsum("ij,ij->i", n, d)
     scale = float(np.clip(robust_scale(plane), config.scale_floor_m, config.scale_ceiling_m))
+    scale = max(scale, least_scale_m)
     robust = tukey_weights(plane, scale)
     alpha = config.point_weight
     gain = np.sqrt(1 + alpha) - np.sqrt(alpha)

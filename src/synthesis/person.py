@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A person of a given shape, with the display skin, the soles and, if wanted, clothes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from kintrack.body import Body, load_body, load_rig, model_folder, run_kinematics
+from kintrack.skin import Skin, load_skin, skinned_vertices, vertex_normals
+
+SIDES = ("l", "r")
+SOLE_HEIGHT_M = 0.012
+"""How far above its lowest point a foot counts as sole [m]."""
+CLOTH_MIN_M, CLOTH_MAX_M = 0.005, 0.015
+"""Thinnest and thickest clothes [m]."""
+CLOTH_WAVE_M = (0.25, 0.60)
+"""Shortest and longest wave of the cloth's thickness [m]."""
+CLOTH_WAVES = 6
+BARE_LINKS = ("neck", "head", "l_hand", "r_hand", "l_foot", "r_foot")
+"""Links that clothes leave bare."""
+
+
+@dataclass(frozen=True)
+class Person:
+    """A body, its skin, and the feet that stand on the floor."""
+
+    body: Body
+    """Kinematic tree."""
+    skin: Skin
+    """Display skin."""
+    foot_points: dict[str, Float[ndarray, "n 3"]]
+    """Skin of each foot in the foot's frame [m]."""
+    heel: dict[str, Float[ndarray, " 3"]]
+    """Rearmost point of each sole in the foot's frame [m]."""
+    toe: dict[str, Float[ndarray, " 3"]]
+    """Foremost point of each sole in the foot's frame [m]."""
+
+
+def load_person(shape: Float[ndarray, " k"] | None = None) -> Person:
+    """A bare person.
+
+    Args:
+        shape: Shape coefficients [standard deviations]; the average adult if None.
+
+    Returns:
+        The person.
+    """
+    body, skin = load_body(shape=shape), load_skin("display", shape=shape)
+    state = run_kinematics(body, body.neutral())
+    vertices = skinned_vertices(state, skin)
+    points, heel, toe = {}, {}, {}
+    for side in SIDES:
+        link = skin.link_names.index(f"{side}_foot")
+        of_foot = (skin.weights * (skin.links == link)).sum(axis=1) > 0.9
+        T = state.Ts_world_link[link]
+        foot = (vertices[of_foot] - T[:3, 3]) @ T[:3, :3]
+        sole = foot[foot[:, 2] < foot[:, 2].min() + SOLE_HEIGHT_M]
+        points[side] = foot
+        heel[side], toe[side] = sole[sole[:, 0].argmin()], sole[sole[:, 0].argmax()]
+    return Person(body, skin, points, heel, toe)
+
+
+def dressed(person: Person, shape: Float[ndarray, " k"] | None, rng: np.random.Generator) -> Person:
+    """The person with clothes: the skin moved outwards by 5 to 15 mm, smoothly varying.
+
+    The thickness is a sum of plane waves over the bind pose, scaled to the range, and fades to
+    nothing over the neck, the wrists and the ankles with the skinning weights. Clothes turn with
+    the skin; they do not swing or fold.
+
+    Args:
+        person: The bare person.
+        shape: The shape it was loaded with.
+        rng: Draws the waves.
+
+    Returns:
+        The person in clothes; body and feet are unchanged.
+    """
+    skin = person.skin
+    Ts_root_link = load_rig(model_folder(), shape).Ts_root_link[skin.links]  # (V, 4, 4, 4)
+    vertices = np.einsum("vij,vj->vi", Ts_root_link[:, 0, :3, :3], skin.points_link[:, 0])
+    vertices = vertices + Ts_root_link[:, 0, :3, 3]
+    directions = rng.normal(size=(CLOTH_WAVES, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    lengths = rng.uniform(*CLOTH_WAVE_M, size=CLOTH_WAVES)
+    phases = rng.uniform(0.0, 2.0 * np.pi, size=CLOTH_WAVES)
+    waves = np.sin(2.0 * np.pi * vertices @ (directions / lengths[:, None]).T + phases).sum(axis=1)
+    share = (waves - waves.min()) / (waves.max() - waves.min())
+    bare = np.isin(skin.links, [skin.link_names.index(name) for name in BARE_LINKS])
+    covered = (skin.weights * ~bare).sum(axis=1)
+    thickness = covered * (CLOTH_MIN_M + (CLOTH_MAX_M - CLOTH_MIN_M) * share)
+    offset = thickness[:, None] * vertex_normals(vertices, skin.faces)
+    moved = skin.points_link + np.einsum("vbji,vj->vbi", Ts_root_link[..., :3, :3], offset)
+    return replace(person, skin=replace(skin, points_link=np.ascontiguousarray(moved)))
