@@ -144,6 +144,8 @@ class Rig:
     """Bind pose of the links, for the given shape."""
     extra_offsets: dict[str, Float[ndarray, "3"]]
     """Change of the fixed frames that are no link's origin, root axes [m]."""
+    explained: Float[ndarray, " k"]
+    """Share of the population's variance that each shape coefficient explains."""
 
 
 def load_rig(folder: Path, shape: Float[ndarray, " k"] | None = None) -> Rig:
@@ -166,7 +168,7 @@ def load_rig(folder: Path, shape: Float[ndarray, " k"] | None = None) -> Rig:
     Ts[:, :3, 3] += np.tensordot(b, origins[: len(b)], 1)
     names = (str(name) for name in arrays["extra_names"])
     offsets = dict(zip(names, np.tensordot(b, extra[: len(b)], 1), strict=True))
-    return Rig(tuple(str(name) for name in arrays["link_names"]), Ts, offsets)
+    return Rig(tuple(str(name) for name in arrays["link_names"]), Ts, offsets, arrays["explained_variance"])
 
 
 def shape_coefficients(shape: Float[ndarray, " k"] | None, available: int) -> ndarray:

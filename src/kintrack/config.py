@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 from kintrack.errors import ConfigError
 
@@ -174,34 +174,6 @@ class StartConfig:
 
 
 @dataclass(frozen=True)
-class LimbConfig:
-    """The search for limbs that have left their data."""
-
-    candidates: int = 0
-    """Configurations tried per limb; 0 turns the search off."""
-    points: int = 48
-    """Skin vertices that stand for a limb."""
-    pixels: int = 800
-    """About how many observed pixels take part."""
-    explained_m: float = 0.06
-    """Distance at which a point counts as explained [m]."""
-    trigger_m2: float = 0.006
-    """Unexplained area that starts a search, and the gain that a change must bring [m^2]."""
-    seed: int = 0
-    """Seed of the configurations."""
-
-    def __post_init__(self) -> None:
-        _check(
-            self,
-            candidates=(0, 100_000),
-            points=(8, 500),
-            pixels=(50, 20_000),
-            explained_m=(0.01, 1.0),
-            trigger_m2=(0.0, 1.0),
-        )
-
-
-@dataclass(frozen=True)
 class JudgeConfig:
     """When a fit counts as tracking."""
 
@@ -243,16 +215,5 @@ class TrackerConfig:
     """Gauss-Newton."""
     start: StartConfig = field(default_factory=StartConfig)
     """First start."""
-    limbs: LimbConfig = field(default_factory=LimbConfig)
-    """Limb search."""
     judge: JudgeConfig = field(default_factory=JudgeConfig)
     """Status."""
-
-
-def to_dict(config) -> dict:
-    """The configuration as plain numbers, for `summary.json`."""
-    return {
-        f.name: to_dict(value) if hasattr(value := getattr(config, f.name), "__post_init__")
-        or isinstance(value, TrackerConfig) else value
-        for f in fields(config)
-    }

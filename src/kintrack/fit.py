@@ -1,123 +1,164 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Associate, solve, repeat: one pose fitted to one observation."""
+"""A whole recording through the tracker: result folder, video, page, live view, progress."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.association.observation import Observation
-from kintrack.association.visibility import visible_vertices
-from kintrack.association.window import associate
-from kintrack.body import BodyState, run_kinematics
+from kintrack.body import run_kinematics
 from kintrack.config import TrackerConfig
-from kintrack.geometry import invert_rigid, transform_points
-from kintrack.human import Human
-from kintrack.residuals.linearization import Residual
-from kintrack.residuals.surface import SurfaceResidual, surface_residual
-from kintrack.skin import skinned_vertices, vertex_normals
-from kintrack.solver.gauss_newton import solve
+from kintrack.errors import ResultError
+from kintrack.export import HtmlRecorder, VideoWriter, draw_overlay
+from kintrack.export.overlay import depth_range
+from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
+from kintrack.human import Human, load_human
+from kintrack.joints import JOINT_NAMES
+from kintrack.result import FrameResult, Track, TrackWriter, make_result_folder
+from kintrack.sequence.frame import Frame, SequenceReader
+from kintrack.skin import skinned_vertices
+from kintrack.tracker import Tracker
+from kintrack.viewer import NullViewer, Viewer
+
+RESULT_FOLDER = "kintrack"
+"""Default result folder inside a sequence."""
 
 
 @dataclass(frozen=True)
-class View:
-    """The skin as the camera would see it."""
+class Outputs:
+    """What a fit writes besides the result folder."""
 
-    vertices_camera: Float[ndarray, "v 3"]
-    """Vertices, camera frame [m]."""
-    normals_camera: Float[ndarray, "v 3"]
-    """Outward unit normals, camera frame."""
-    visible: Bool[ndarray, " v"]
-    """Vertices the camera would see if nothing else were there."""
+    video: Path | None = None
+    """Overlay video (mp4) of depth, skin and skeleton."""
+    html: Path | None = None
+    """Page with the animated body and point cloud."""
 
 
-@dataclass(frozen=True)
-class Fit:
-    """A pose and the data term it was solved with last."""
-
-    state: BodyState
-    """Body at the solution."""
-    surface: SurfaceResidual
-    """Pairs of the last round."""
-    iterations: int
-    """Accepted solver steps, all rounds."""
-
-
-def view_skin(
-    human: Human, state: BodyState, T_camera_world: ndarray, obs: Observation, config: TrackerConfig
-) -> View:
-    """Skin the state, move it to the camera and find what is visible."""
-    vertices = transform_points(T_camera_world, skinned_vertices(state, human.skin))
-    normals = vertex_normals(vertices, human.skin.faces)
-    a = config.association
-    visible = visible_vertices(
-        vertices, normals, human.skin.faces, obs.camera, a.facing, a.self_occlusion_m
-    )
-    return View(vertices, normals, visible)
-
-
-def fit_pose(
-    human: Human,
-    observation: Observation,
-    q: Float[ndarray, " nq"],
-    priors: Sequence[Residual],
-    T_world_camera: Float[ndarray, "4 4"],
-    config: TrackerConfig,
-    gates_m: Sequence[float],
-    clock: Callable[[str], None] = lambda stage: None,
-) -> Fit:
-    """Fit a pose: one association per gate, a few Gauss-Newton steps each.
+def fit_sequence(
+    sequence: SequenceReader,
+    folder: Path,
+    config: TrackerConfig | None = None,
+    outputs: Outputs | None = None,
+    viewer: Viewer | None = None,
+    T_world_camera: Float[ndarray, "4 4"] = T_LEVEL_WORLD_CAMERA,
+    on_frame: Callable[[Frame, FrameResult], None] = lambda frame, result: None,
+) -> Track:
+    """Track a recording into a result folder that is valid at every moment.
 
     Args:
-        human: Body and skin.
-        observation: What the camera saw.
-        q: First guess, within limits.
-        priors: Terms besides the surface.
-        T_world_camera: Camera pose.
-        config: All weights.
-        gates_m: Largest pair distance of each round [m].
-        clock: Called after each stage with its name.
+        sequence: The recording.
+        folder: Result folder; made where missing.
+        config: All weights; the defaults if None.
+        outputs: Video and page, if wanted.
+        viewer: Shown every frame, if given.
+        T_world_camera: Camera pose; a level camera if not given.
+        on_frame: Called after every frame, for progress.
 
     Returns:
-        The fit; rounds end early once no joint moves.
+        The track; also written when an exception or Ctrl-C ends the loop.
 
     Raises:
-        AssociationError: if nothing observed lies within a round's gate.
+        ResultError: if an output cannot be written, before any work.
     """
-    T_camera_world = invert_rigid(T_world_camera)
-    R = T_world_camera[:3, :3]
-    state, damping, iterations, surface = run_kinematics(human.body, q), config.solver.damping, 0, None
-    for gate_m in gates_m:
-        view = view_skin(human, state, T_camera_world, observation, config)
-        clock("skin")
-        pairs = associate(
-            observation, view.vertices_camera, view.visible,
-            config.association.gate_m, gate_m,
-            config.association.pixel_pairs,
+    outputs = Outputs() if outputs is None else outputs
+    viewer = NullViewer() if viewer is None else viewer
+    for path in (outputs.video, outputs.html):
+        if path is not None:
+            make_result_folder(path.parent)
+    tracker = Tracker(config, T_world_camera=T_world_camera)
+    facts = asdict(tracker.config)
+    with ExitStack() as stack:
+        writer = stack.enter_context(
+            TrackWriter(
+                folder,
+                JOINT_NAMES,
+                sequence_name=sequence.name,
+                camera=sequence.camera,
+                config=facts,
+            )
         )
-        clock("associate")
-        surface = surface_residual(
-            human.skin,
-            pairs.vertex,
-            transform_points(T_world_camera, pairs.points_camera),
-            transform_points(T_world_camera, view.vertices_camera),
-            view.normals_camera @ R.T,
-            config.surface,
-            gate_m / 8 if gate_m > config.association.last_gate_m else 0.0,
-        )
-        before = state.joint_positions_world
-        solution = solve(
-            human.body, state, [surface, *priors], config.solver.steps, damping
-        )
-        state, damping = solution.state, solution.damping
-        iterations += solution.steps
-        clock("solve")
-        moved = np.linalg.norm(state.joint_positions_world - before, axis=1).max()
-        if moved < config.solver.tolerance_m and gate_m == gates_m[-1]:
-            break
-    assert surface is not None
-    return Fit(state, surface, iterations)
+        writer.note(T_world_camera=T_world_camera)
+        video = outputs.video and stack.enter_context(VideoWriter(outputs.video, _rate(sequence)))
+        page = None
+        if outputs.html is not None:
+            page = HtmlRecorder(tracker.human.skin, T_world_camera, title=sequence.name)
+            stack.callback(page.write, outputs.html)
+        shades = None
+        for frame in sequence:
+            result = tracker.step(frame)
+            writer.append(result)
+            writer.note(person={"shape": tracker.human.shape})
+            vertices = posed_skin(tracker.human, result.q, T_world_camera)
+            joints = result.joint_positions_camera_m
+            text = caption(frame, result)
+            viewer.show(frame, vertices, joints, result.status, text)
+            if page is not None:
+                page.add(frame, vertices, joints, result.status, text)
+            if video:
+                shades = depth_range(frame.depth_m) if shades is None else shades
+                skin = tracker.human.skin
+                video.write(
+                    draw_overlay(
+                        frame, vertices, skin.faces, skin.labels, joints, result.status, text,
+                        shades,
+                    )
+                )
+            on_frame(frame, result)
+        return writer.close()
+
+
+def posed_skin(
+    human: Human, q: Float[ndarray, " nq"], T_world_camera: Float[ndarray, "4 4"]
+) -> Float[ndarray, "v 3"] | None:
+    """Skin vertices at q in the camera frame [m]; None where q is not known."""
+    if not np.isfinite(q).all():
+        return None
+    vertices = skinned_vertices(run_kinematics(human.body, q), human.skin)
+    return transform_points(invert_rigid(T_world_camera), vertices)
+
+
+def caption(frame: Frame, result: FrameResult) -> str:
+    """One line about a frame for pictures: number, speed, residual, or why it was skipped."""
+    if result.reason is not None:
+        return f"frame {frame.index}  {result.reason}"
+    text = f"frame {frame.index}  {result.milliseconds:.0f} ms"
+    if np.isfinite(result.residual_rms_m):
+        text += f"  residual {1e3 * result.residual_rms_m:.0f} mm"
+    return text
+
+
+def load_person(folder: Path) -> tuple[Human, Float[ndarray, "4 4"]]:
+    """The human and the camera pose that a result was tracked with.
+
+    Args:
+        folder: Result folder.
+
+    Returns:
+        The human and T_world_camera.
+
+    Raises:
+        ResultError: if the summary is missing or broken.
+    """
+    path = folder / "summary.json"
+    try:
+        summary = json.loads(path.read_text())
+        shape = np.array(summary.get("person", {}).get("shape", []), dtype=float)
+        T_world_camera = np.array(summary["T_world_camera"], dtype=float).reshape(4, 4)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise ResultError(f"{path}: no readable summary of a result ({error!r})") from error
+    return load_human(shape=shape if len(shape) else None), T_world_camera
+
+
+def _rate(sequence: SequenceReader) -> float:
+    """Frames per second of a recording by its first two time stamps [hz]; 30 if there is one."""
+    if len(sequence) < 2:
+        return 30.0
+    step_s = sequence.frame(1).timestamp_s - sequence.frame(0).timestamp_s
+    return float(np.clip(1.0 / step_s, 1.0, 120.0))

@@ -100,6 +100,25 @@ class PinholeCamera:
         )
 
 
+def camera_pose(pitch_deg: float) -> Float[ndarray, "4 4"]:
+    """T_world_camera of a camera at the world's origin that looks down by an angle.
+
+    Args:
+        pitch_deg: Angle below the horizon [deg], -90 to 90.
+
+    Returns:
+        T_world_camera, shape (4, 4).
+
+    Raises:
+        ConfigError: if the angle is out of range.
+    """
+    if not -90.0 <= pitch_deg <= 90.0:
+        raise ConfigError(f"camera pitch = {pitch_deg!r} deg: -90 to 90 are allowed")
+    c, s = math.cos(math.radians(pitch_deg)), math.sin(math.radians(pitch_deg))
+    tilt = np.array([[c, 0, s, 0], [0, 1, 0, 0], [-s, 0, c, 0], [0, 0, 0, 1]])
+    return tilt @ T_LEVEL_WORLD_CAMERA
+
+
 def invert_rigid(T_a_b: Float[ndarray, "*n 4 4"]) -> Float[ndarray, "*n 4 4"]:
     """Inverse of rigid transforms: T_b_a from T_a_b, shape (..., 4, 4)."""
     T_b_a = np.zeros_like(T_a_b)

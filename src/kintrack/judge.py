@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from kintrack.association.observation import Observation
 from kintrack.association.window import sample_region
 from kintrack.config import JudgeConfig
-from kintrack.fit import View
+from kintrack.alignment import View
 
 
 @dataclass(frozen=True)

@@ -318,6 +318,10 @@ class TrackWriter:
         if time.monotonic() - self._written_at_s >= self._flush_every_s:
             self._write(finished=False)
 
+    def note(self, **facts: Any) -> None:
+        """Add facts of the run to the summary, such as the person's shape, from now on."""
+        self._facts.update(facts)
+
     def close(self, *, finished: bool = True) -> Track:
         """Write every frame so far; `finished` says in the summary whether the recording ended.
 

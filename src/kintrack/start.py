@@ -19,7 +19,7 @@ from kintrack.association.observation import Observation
 from kintrack.body import run_kinematics
 from kintrack.config import StartConfig, TrackerConfig
 from kintrack.errors import AssociationError
-from kintrack.fit import Fit, fit_pose, view_skin
+from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.geometry import invert_rigid, transform_points
 from kintrack.human import RESTING_DEG, SITTING_DEG, Human, load_human, posed, prior_sigma
 from kintrack.judge import Agreement, agreement, distance_between

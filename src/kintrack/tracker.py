@@ -11,16 +11,15 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.association.observation import Observation, observe, observed_area, within
+from kintrack.association.observation import Observation, observe, within
 from kintrack.body import joint_jacobians, run_kinematics
 from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
-from kintrack.fit import Fit, fit_pose, view_skin
+from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
 from kintrack.human import RESTING_DEG, Human, load_human, motion_sigma, posed, prior_sigma
 from kintrack.joints import JOINT_NAMES
 from kintrack.judge import acceptable, agreement, joint_visibility
-from kintrack.limbs import build_limbs, search_limbs
 from kintrack.residuals.prior import diagonal_prior, gaussian_prior
 from kintrack.result import FrameResult
 from kintrack.sequence.frame import Frame
@@ -70,9 +69,8 @@ class Tracker:
         self._meet(load_human() if human is None else human)
 
     def _meet(self, human: Human) -> None:
-        """Take this person's body, with the prior and the limb library that belong to it."""
+        """Take this person's body, with the pose prior that belongs to it."""
         self.human = human
-        self._limbs = build_limbs(human, self.config.limbs)
         resting = posed(human.body, RESTING_DEG)
         self._pose_prior = diagonal_prior(resting, prior_sigma(human.body, self.config.prior))
 
@@ -104,34 +102,9 @@ class Tracker:
                 self.human, observation, predicted, priors, self.T_world_camera, config, gates,
                 self._clock,
             )
-            fit = self._search(fit, observation, covariance)
         except AssociationError:
             return self._miss(frame, began)
         return self._report(frame, observation, fit, priors, began)
-
-    def _search(self, fit: Fit, observation: Observation, covariance: ndarray) -> Fit:
-        """The fit, or a better one with limbs moved to data that it left unexplained."""
-        config, T_camera_world = self.config, invert_rigid(self.T_world_camera)
-        view = view_skin(self.human, fit.state, T_camera_world, observation, config)
-        agreed = agreement(view, observation, config.judge.explained_m)
-        area = (1 - agreed.explained) * observed_area(observation)
-        if area < config.limbs.trigger_m2 or config.limbs.candidates == 0:
-            return fit
-        q = search_limbs(
-            self.human, self._limbs, fit.state, view, observation, T_camera_world, config.limbs
-        )
-        if q is None:
-            return fit
-        priors = [gaussian_prior(q, covariance), self._pose_prior]
-        gates = [1.5 * config.association.last_gate_m] * 2 + [config.association.last_gate_m] * 2
-        moved = fit_pose(
-            self.human, observation, q, priors, self.T_world_camera, config, gates, self._clock
-        )
-        seen = view_skin(self.human, moved.state, T_camera_world, observation, config)
-        again = agreement(seen, observation, config.judge.explained_m)
-        better = again.explained + again.supported > agreed.explained + agreed.supported
-        self._clock("limbs")
-        return moved if better else fit
 
     def _start(self, frame: Frame, observation: Observation, began: float) -> FrameResult:
         """First frame, or the first after a loss: find the person and fit from several guesses."""

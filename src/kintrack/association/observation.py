@@ -48,9 +48,3 @@ def within(observation: Observation, box_camera: Float[ndarray, "2 3"]) -> Obser
     p = observation.points_camera
     inside = ((p >= low) & (p <= high)).all(axis=-1)
     return Observation(observation.camera, p, observation.region & inside)
-
-
-def observed_area(observation: Observation) -> float:
-    """Area of the region across the line of sight [m^2]: sum of z^2 / (fx fy)."""
-    z = observation.points_camera[..., 2][observation.region]
-    return float((z * z).sum() / (observation.camera.fx * observation.camera.fy))
