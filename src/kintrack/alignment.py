@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from kintrack.association.observation import Observation
+from kintrack.association.silhouette import outside_pairs, silhouette
 from kintrack.association.visibility import visible_vertices
 from kintrack.association.window import associate
 from kintrack.body import BodyState, run_kinematics
@@ -18,7 +19,7 @@ from kintrack.config import TrackerConfig
 from kintrack.geometry import invert_rigid, transform_points
 from kintrack.human import Human
 from kintrack.residuals.linearization import Residual
-from kintrack.residuals.surface import SurfaceResidual, surface_residual
+from kintrack.residuals.surface import SurfaceResidual, silhouette_residual, surface_residual
 from kintrack.skin import skinned_vertices, vertex_normals
 from kintrack.solver.gauss_newton import solve
 
@@ -91,6 +92,7 @@ def fit_pose(
     T_camera_world = invert_rigid(T_world_camera)
     R = T_world_camera[:3, :3]
     state, damping, iterations, surface = run_kinematics(human.body, q), config.solver.damping, 0, None
+    outline = silhouette(observation)
     for gate_m in gates_m:
         view = view_skin(human, state, T_camera_world, observation, config)
         clock("skin")
@@ -99,19 +101,31 @@ def fit_pose(
             config.association.gate_m, gate_m,
             config.association.pixel_pairs,
         )
+        beside = outside_pairs(
+            outline, observation, view.vertices_camera, view.visible,
+            config.association.silhouette_tolerance_m, config.association.silhouette_gate_m,
+        )
         clock("associate")
+        vertices_world = transform_points(T_world_camera, view.vertices_camera)
         surface = surface_residual(
             human.skin,
             pairs.vertex,
             transform_points(T_world_camera, pairs.points_camera),
-            transform_points(T_world_camera, view.vertices_camera),
+            vertices_world,
             view.normals_camera @ R.T,
             config.surface,
             gate_m / 8 if gate_m > config.association.last_gate_m else 0.0,
         )
+        outside = silhouette_residual(
+            human.skin,
+            beside.vertex,
+            transform_points(T_world_camera, beside.points_camera),
+            vertices_world,
+            config.surface,
+        )
         before = state.joint_positions_world
         solution = solve(
-            human.body, state, [surface, *priors], config.solver.steps, damping
+            human.body, state, [surface, outside, *priors], config.solver.steps, damping
         )
         state, damping = solution.state, solution.damping
         iterations += solution.steps

@@ -30,6 +30,10 @@ class AssociationConfig:
     """Largest distance between a point and the vertex it takes in a frame's first round [m]."""
     last_gate_m: float = 0.10
     """The same in the last round [m]."""
+    silhouette_tolerance_m: float = 0.03
+    """How far outside the silhouette a vertex may project [m]."""
+    silhouette_gate_m: float = 0.4
+    """Vertices further outside than this are left alone [m]."""
     start_gate_m: float = 0.35
     """Largest distance in the first rounds of a start [m]."""
     facing: float = 0.15
@@ -48,6 +52,8 @@ class AssociationConfig:
             gate_m=(0.01, 1.0),
             first_gate_m=(0.01, 2.0),
             last_gate_m=(0.01, 2.0),
+            silhouette_tolerance_m=(0.0, 1.0),
+            silhouette_gate_m=(0.0, 5.0),
             start_gate_m=(0.01, 2.0),
             facing=(0.0, 1.0),
             self_occlusion_m=(0.0, 1.0),
@@ -66,6 +72,8 @@ class SurfaceConfig:
     """Least robust scale of the residuals [m]."""
     scale_ceiling_m: float = 0.03
     """Largest robust scale of the residuals [m]."""
+    silhouette_weight: float = 3.0
+    """Weight of skin outside the silhouette against a surface pair."""
     correlation: float = 8.0
     """How many neighbouring pairs carry the information of one independent pair."""
 
@@ -75,6 +83,7 @@ class SurfaceConfig:
             point_weight=(0.0, 10.0),
             scale_floor_m=(1e-4, 0.1),
             scale_ceiling_m=(1e-3, 1.0),
+            silhouette_weight=(0.0, 100.0),
             correlation=(1.0, 1e4),
         )
 

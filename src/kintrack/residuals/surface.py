@@ -18,7 +18,7 @@ from numpy import ndarray
 from kintrack.body import BodyState
 from kintrack.config import SurfaceConfig
 from kintrack.errors import AssociationError
-from kintrack.geometry import robust_scale, tukey_weights
+from kintrack.geometry import huber_weights, robust_scale, tukey_weights
 from kintrack.residuals.linearization import Linearization, Quadratic
 from kintrack.skin import Skin, skinned_vertices, vertex_jacobians
 
@@ -107,25 +107,62 @@ def surface_residual(
     if len(vertex) == 0:
         raise AssociationError("no observed point lies near the skin")
     n = normals_world[vertex]
-    d = vertices_world[vertex] - points_world
-    plane = np.einsum("ij,ij->i", n, d)
+    plane = np.einsum("ij,ij->i", n, vertices_world[vertex] - points_world)
     scale = float(np.clip(robust_scale(plane), config.scale_floor_m, config.scale_ceiling_m))
     scale = max(scale, least_scale_m)
     robust = tukey_weights(plane, scale)
-    alpha = config.point_weight
-    gain = np.sqrt(1 + alpha) - np.sqrt(alpha)
-    roots = gain * n[:, :, None] * n[:, None, :] + np.sqrt(alpha) * np.eye(3)
     inlier = robust > 0.5
     return SurfaceResidual(
         skin=skin,
         vertex=vertex,
         points_world=points_world,
-        roots=roots,
+        roots=_roots(n, config.point_weight),
         weights=robust / (config.correlation * scale**2),
         scale_m=scale,
         inliers=int(inlier.sum()),
         rms_m=float(np.sqrt(np.mean(plane[inlier] ** 2))) if inlier.any() else float("nan"),
     )
+
+
+def silhouette_residual(
+    skin: Skin,
+    vertex: Int[ndarray, " n"],
+    points_world: Float[ndarray, "n 3"],
+    vertices_world: Float[ndarray, "v 3"],
+    config: SurfaceConfig,
+) -> SurfaceResidual:
+    """Draw vertices along the line to their silhouette point, with Huber weights.
+
+    Args:
+        skin: The skin.
+        vertex: Vertex of each pair.
+        points_world: Silhouette point of each pair [m].
+        vertices_world: All vertices now [m].
+        config: Weight and scale.
+
+    Returns:
+        The term, possibly without pairs.
+    """
+    d = vertices_world[vertex] - points_world
+    length = np.linalg.norm(d, axis=1)
+    scale = config.scale_ceiling_m
+    robust = huber_weights(length, scale)
+    return SurfaceResidual(
+        skin=skin,
+        vertex=vertex,
+        points_world=points_world,
+        roots=_roots(d / np.maximum(length, 1e-9)[:, None], 0.0),
+        weights=config.silhouette_weight * robust / (config.correlation * scale**2),
+        scale_m=scale,
+        inliers=len(vertex),
+        rms_m=float("nan"),
+    )
+
+
+def _roots(n: Float[ndarray, "n 3"], alpha: float) -> Float[ndarray, "n 3 3"]:
+    """A_i of the module's equation."""
+    gain = np.sqrt(1 + alpha) - np.sqrt(alpha)
+    return gain * n[:, :, None] * n[:, None, :] + np.sqrt(alpha) * np.eye(3)
 
 
 @njit(cache=True)
