@@ -96,6 +96,12 @@ def unsized() -> TrackerConfig:
 
 
 @pytest.fixture(scope="session")
+def quick(unsized) -> TrackerConfig:
+    """As `unsized`, and the person stands as expected, so that a start needs few rounds."""
+    return replace(unsized, start=replace(unsized.start, rounds=6))
+
+
+@pytest.fixture(scope="session")
 def legal_pose(body):
     """A function of a seed: any root, every hinge anywhere within its limits."""
 

@@ -84,7 +84,7 @@ def fit_pose(
         clock: Called after each stage with its name.
 
     Returns:
-        The fit; rounds end early once no joint moves.
+        The fit; once no joint moves, only the last gate is still tried.
 
     Raises:
         AssociationError: if nothing observed lies within a round's gate.
@@ -93,7 +93,9 @@ def fit_pose(
     R = T_world_camera[:3, :3]
     state, damping, iterations, surface = run_kinematics(human.body, q), config.solver.damping, 0, None
     outline = silhouette(observation)
-    for gate_m in gates_m:
+    remaining = list(gates_m)
+    while remaining:
+        gate_m = remaining.pop(0)
         view = view_skin(human, state, T_camera_world, observation, config)
         clock("skin")
         pairs = associate(
@@ -131,7 +133,7 @@ def fit_pose(
         iterations += solution.steps
         clock("solve")
         moved = np.linalg.norm(state.joint_positions_world - before, axis=1).max()
-        if moved < config.solver.tolerance_m and gate_m == gates_m[-1]:
-            break
+        if moved < config.solver.tolerance_m:
+            remaining = remaining[-1:]
     assert surface is not None
     return Fit(state, surface, iterations)

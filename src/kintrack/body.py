@@ -168,7 +168,9 @@ def load_rig(folder: Path, shape: Float[ndarray, " k"] | None = None) -> Rig:
     Ts[:, :3, 3] += np.tensordot(b, origins[: len(b)], 1)
     names = (str(name) for name in arrays["extra_names"])
     offsets = dict(zip(names, np.tensordot(b, extra[: len(b)], 1), strict=True))
-    return Rig(tuple(str(name) for name in arrays["link_names"]), Ts, offsets, arrays["explained_variance"])
+    return Rig(
+        tuple(str(name) for name in arrays["link_names"]), Ts, offsets, arrays["explained_variance"]
+    )
 
 
 def shape_coefficients(shape: Float[ndarray, " k"] | None, available: int) -> ndarray:

@@ -40,7 +40,7 @@ class AssociationConfig:
     """Least cosine between a vertex normal and the ray to the camera."""
     self_occlusion_m: float = 0.03
     """A vertex further than this behind the body's own depth buffer is hidden [m]."""
-    pixel_pairs: int = 1200
+    pixel_pairs: int = 700
     """About how many observed pixels look for their vertex."""
     region_margin_m: float = 0.35
     """Observed points further than this from the predicted body's box are ignored [m]."""
@@ -135,7 +135,7 @@ class SolverConfig:
 
     rounds: int = 6
     """Associations per frame at most."""
-    steps: int = 2
+    steps: int = 1
     """Accepted steps per association at most."""
     damping: float = 1e-3
     """First Levenberg damping, relative to the diagonal."""

@@ -106,7 +106,13 @@ def fit_sequence(
                 skin = tracker.human.skin
                 video.write(
                     draw_overlay(
-                        frame, vertices, skin.faces, skin.labels, joints, result.status, text,
+                        frame,
+                        vertices,
+                        skin.faces,
+                        skin.labels,
+                        joints,
+                        result.status,
+                        text,
                         shades,
                     )
                 )

@@ -11,9 +11,13 @@ from numpy import ndarray
 from scipy.spatial import cKDTree
 
 from kintrack.association.observation import Observation
-from kintrack.association.window import sample_region
+from kintrack.association.window import associate, sample_region
 from kintrack.config import JudgeConfig
 from kintrack.alignment import View
+
+
+SAMPLES = 600
+"""About how many observed points are asked whether the skin explains them."""
 
 
 @dataclass(frozen=True)
@@ -39,17 +43,16 @@ def agreement(view: View, observation: Observation, explained_m: float) -> Agree
     Returns:
         Shares, 0 where there is nothing to compare.
     """
-    points = sample_region(observation, 1500)
-    index = np.flatnonzero(view.visible)
+    pairs = associate(
+        observation, view.vertices_camera, view.visible, explained_m, explained_m, SAMPLES
+    )
     supported = np.zeros(len(view.visible), dtype=bool)
-    if len(points) == 0 or len(index) == 0:
-        return Agreement(0.0, 0.0, supported)
-    skin = view.vertices_camera[index]
-    to_skin = cKDTree(skin).query(points, distance_upper_bound=explained_m)[0]
-    to_points = cKDTree(points).query(skin, distance_upper_bound=explained_m)[0]
-    supported[index] = np.isfinite(to_points)
+    supported[pairs.vertex[: pairs.from_skin]] = True
+    asked = len(sample_region(observation, SAMPLES))
     return Agreement(
-        float(np.isfinite(to_skin).mean()), float(np.isfinite(to_points).mean()), supported
+        explained=(len(pairs.vertex) - pairs.from_skin) / max(asked, 1),
+        supported=pairs.from_skin / max(int(view.visible.sum()), 1),
+        vertex_supported=supported,
     )
 
 

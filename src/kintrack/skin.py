@@ -102,9 +102,7 @@ def vertex_jacobians(
     Returns:
         J (N, 3, nv) [m per m or rad], through `pin.integrate`.
     """
-    return _jacobians(
-        state.Ts_world_link, state.J_world, state.body.support, *_rows(skin, vertex)
-    )
+    return _jacobians(state.Ts_world_link, state.J_world, state.body.support, *_rows(skin, vertex))
 
 
 def directional_jacobians(

@@ -6,12 +6,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
+
+from report import cpu_model, table
 
 from kintrack.errors import ResultError
 from kintrack.result import write_json
-from report import cpu_model, table
 
 BASELINE = Path(__file__).parent / "baseline.json"
 """The committed values."""
@@ -65,6 +67,11 @@ def target_table(metrics: Sequence[Metric]) -> str:
         verdict = "-" if m.target is None else "pass" if m.passed else "**fail**"
         rows.append([m.says, m.show(m.value), wanted, verdict])
     return table(["", "measured", "target", ""], rows)
+
+
+def as_dict(metrics: Sequence[Metric]) -> dict[str, dict[str, Any]]:
+    """Name -> everything about a metric, for JSON."""
+    return {m.name: asdict(m) | {"passed": m.passed} for m in metrics}
 
 
 def save(group: str, metrics: Sequence[Metric], path: Path = BASELINE) -> None:
@@ -127,7 +134,7 @@ def machine(group: str, path: Path = BASELINE) -> str:
     return str(_read(path).get(group, {}).get("machine", "unknown"))
 
 
-def _read(path: Path) -> dict:
+def _read(path: Path) -> dict[str, Any]:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import baseline
 from baseline import Metric
-from kintrack.errors import KintrackError
 from report import ROOT, cpu_model
+
+from kintrack.errors import KintrackError
 
 DATA = ROOT.parent / "shared" / "data"
 """Where recordings are looked for if nothing else is said."""

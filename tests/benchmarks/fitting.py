@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import json
 import multiprocessing
@@ -59,18 +60,15 @@ class Job:
 
 
 def code_digest() -> str:
-    """SHA-256 over the files of code and model that decide the fitted poses."""
+    """SHA-256 over code and model that decide the poses; layout and comments do not count."""
     package = Path(kintrack.__file__).parent
-    files = [
-        path
-        for path in package.rglob("*.py")
-        if path.relative_to(package).parts[0].removesuffix(".py") not in _NOT_TRACKING
-    ]
-    model = model_folder()
-    files += [model / "human.urdf", *(model / "skin").glob("*.npz")]
     digest = hashlib.sha256()
-    for path in sorted(files):
-        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    for path in sorted(package.rglob("*.py")):
+        if path.relative_to(package).parts[0].removesuffix(".py") not in _NOT_TRACKING:
+            digest.update(ast.dump(ast.parse(path.read_bytes())).encode())
+    model = model_folder()
+    for path in [model / "human.urdf", *sorted((model / "skin").glob("*.npz"))]:
+        digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
@@ -133,7 +131,8 @@ def _fit(job: Job, digest: str) -> None:
                 _frames_done.value += 1
 
     code = job.result / CODE_FILE
-    code.unlink(missing_ok=True)
+    for left_over in (code, *job.result.glob(".*.part")):
+        left_over.unlink(missing_ok=True)
     T_world_camera = camera_pose(job.pitch_deg)
     fit_sequence(
         open_sequence(job.sequence), job.result, T_world_camera=T_world_camera, on_frame=count
@@ -144,7 +143,10 @@ def _fit(job: Job, digest: str) -> None:
 def _watch(futures: list[Future[None]], frames_done: Synchronized[int], total: int) -> None:
     """Show frames done and the time left until every future is."""
     with Progress(
-        TextColumn("fitting"), BarColumn(), MofNCompleteColumn(), TextColumn("frames, left"),
+        TextColumn("fitting"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("frames, left"),
         TimeRemainingColumn(),
     ) as bar:
         task = bar.add_task("fit", total=total)

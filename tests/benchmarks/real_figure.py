@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from real_tables import ACTIONS
+from scoring import JOINT_KINDS, RecordingScore, pool
 
 from kintrack.metrics import THRESHOLDS_M
 from kintrack.result import write_atomically
-from real_tables import ACTIONS
-from scoring import JOINT_KINDS, RecordingScore, pool
 
 _COLORS = ("#56b4e9", "#0072b2", "#e69f00", "#d55e00", "#009e73", "#cc79a7", "#999999")
 _BLUE, _ORANGE = "#0072b2", "#d55e00"
@@ -53,7 +53,10 @@ def _actions(axis: Axes, scores: Sequence[RecordingScore]) -> None:
     y = np.arange(len(rows))
     axis.barh(y - 0.2, [100 * p.mean_m for _, p in rows], 0.4, color=_BLUE, label="mean distance")
     axis.barh(
-        y + 0.2, [100 * p.offset_free_m for _, p in rows], 0.4, color=_ORANGE,
+        y + 0.2,
+        [100 * p.offset_free_m for _, p in rows],
+        0.4,
+        color=_ORANGE,
         label="constant offsets taken off",
     )
     axis.axvline(7.0, color=_BLUE, lw=0.9, ls="--")
@@ -63,6 +66,4 @@ def _actions(axis: Axes, scores: Sequence[RecordingScore]) -> None:
     axis.set_xlabel("distance to the Kinect's joints [cm]; dashed: targets over all", fontsize=8.5)
     axis.set_title("by action", fontsize=9)
     axis.margins(x=0.12)
-    axis.legend(
-        loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, fontsize=8, frameon=False
-    )
+    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, fontsize=8, frameon=False)

@@ -17,12 +17,13 @@ import baseline
 import report
 from command import OUT, parser, refuse_quick_baseline, run, settle
 from fitting import Job, fit_all
-from kintrack.errors import SequenceError
-from kintrack.result import make_result_folder, write_json
 from real_figure import write_figure
 from real_tables import metrics, section, what_goes_wrong
 from scenes import SCENES, SceneScore, score_scene
 from scoring import JOINT_KINDS, RecordingScore, pool, score_recording
+
+from kintrack.errors import SequenceError
+from kintrack.result import make_result_folder, write_json
 
 QUICK = ("a01_s1_t1", "a13_s2_t1", "a22_s3_t1", "a24_s4_t1", "a27_s5_t1")
 """One recording of each person."""
@@ -91,7 +92,7 @@ def _write(scores: Sequence[RecordingScore], scenes: Sequence[SceneScore]) -> No
 
 def _content(scores: Sequence[RecordingScore], scenes: Sequence[SceneScore]) -> dict[str, Any]:
     return {
-        "metrics": {m.name: asdict(m) | {"passed": m.passed} for m in metrics(scores)},
+        "metrics": baseline.as_dict(metrics(scores)),
         "overall": asdict(pool(scores)),
         "joints": {kind: asdict(pool(scores, kind)) for kind in JOINT_KINDS},
         "recordings": {

@@ -6,12 +6,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
 from baseline import Metric, target_table
-from kintrack.metrics import THRESHOLDS_M
+from numpy import ndarray
 from report import table
 from scenes import SceneScore
 from scoring import JOINT_KINDS, JOINTS, Pooled, RecordingScore, nanmean, pool
+
+from kintrack.metrics import THRESHOLDS_M
 
 ACTIONS = {
     1: "swipe",
@@ -34,8 +35,19 @@ FAR_M = 0.20
 """A joint further than this from the Kinect's is worth a word [m]."""
 
 _GROUP = (
-    "", "recordings", "frames", "tracking %", "RMS mm", "worst RMS mm", "distance cm",
-    "offset-free cm", "torso offset-free cm", "within 10 cm %", "swapped", "away", "inside out",
+    "",
+    "recordings",
+    "frames",
+    "tracking %",
+    "RMS mm",
+    "worst RMS mm",
+    "distance cm",
+    "offset-free cm",
+    "torso offset-free cm",
+    "within 10 cm %",
+    "swapped",
+    "away",
+    "inside out",
 )
 
 
@@ -47,27 +59,50 @@ def metrics(scores: Sequence[RecordingScore]) -> list[Metric]:
             "tracking", "frames with status `tracking`", 100 * p.tracking, "%", "higher", 0.3, 98
         ),
         Metric(
-            "rms", "point-to-skin RMS of inliers, mean over frames", 1e3 * p.rms_m, "mm", "lower",
-            0.3, 15,
+            "rms",
+            "point-to-skin RMS of inliers, mean over frames",
+            1e3 * p.rms_m,
+            "mm",
+            "lower",
+            0.3,
+            15,
         ),
         Metric(
             "worst_rms", "the same, worst recording", 1e3 * p.worst_rms_m, "mm", "lower", 1.0, 15
         ),
         Metric(
-            "distance", "mean distance to the Kinect's joints", 100 * p.mean_m, "cm", "lower", 0.2,
+            "distance",
+            "mean distance to the Kinect's joints",
+            100 * p.mean_m,
+            "cm",
+            "lower",
+            0.2,
             7,
         ),
         Metric(
-            "offset_free", "the same, constant offsets per joint and recording taken off",
-            100 * p.offset_free_m, "cm", "lower", 0.2, 4.5,
+            "offset_free",
+            "the same, constant offsets per joint and recording taken off",
+            100 * p.offset_free_m,
+            "cm",
+            "lower",
+            0.2,
+            4.5,
         ),
         Metric(
-            "torso_offset_free", "the same, offsets that turn with the torso",
-            100 * p.torso_offset_free_m, "cm", "lower", 0.2,
+            "torso_offset_free",
+            "the same, offsets that turn with the torso",
+            100 * p.torso_offset_free_m,
+            "cm",
+            "lower",
+            0.2,
         ),
         Metric(
-            "within_10_cm", "joints within 10 cm of the Kinect's",
-            100 * float(np.interp(0.10, THRESHOLDS_M, p.accuracy)), "%", "higher", 1.0,
+            "within_10_cm",
+            "joints within 10 cm of the Kinect's",
+            100 * float(np.interp(0.10, THRESHOLDS_M, p.accuracy)),
+            "%",
+            "higher",
+            1.0,
         ),
         Metric(
             "compared", "Kinect joints that have an estimate", 100 * p.compared, "%", "higher", 0.3
@@ -78,9 +113,7 @@ def metrics(scores: Sequence[RecordingScore]) -> list[Metric]:
     ]
 
 
-def section(
-    scores: Sequence[RecordingScore], scenes: Sequence[SceneScore], conditions: str
-) -> str:
+def section(scores: Sequence[RecordingScore], scenes: Sequence[SceneScore], conditions: str) -> str:
     """Markdown of the whole section."""
     reference_away = sum(int(s.reference_away.sum()) for s in scores)
     contradicted = sum(int((s.away & ~s.reference_away).sum()) for s in scores)
@@ -160,8 +193,14 @@ def _by_joint(scores: Sequence[RecordingScore]) -> str:
         means = (p.mean_m, p.offset_free_m, p.torso_offset_free_m)
         rows.append([kind, *(f"{100 * mean:.1f}" for mean in means), *within, swaps])
     header = (
-        "", "distance cm", "offset-free cm", "torso offset-free cm", "within 5 cm %",
-        "within 10 cm %", "within 20 cm %", "swapped frames",
+        "",
+        "distance cm",
+        "offset-free cm",
+        "torso offset-free cm",
+        "within 5 cm %",
+        "within 10 cm %",
+        "within 20 cm %",
+        "swapped frames",
     )
     return table(header, rows)
 
@@ -191,7 +230,13 @@ def _failures(scores: Sequence[RecordingScore]) -> str:
             limbs = [f"{limb} {int(n.sum())}" for limb, n in s.swapped.items() if n.any()]
             rows.append([s.name, str(len(s.status)), *map(str, counts), ", ".join(limbs) or "-"])
     header = (
-        "recording", "frames", "not tracking", "swapped", "away", "inside out", "swapped limbs",
+        "recording",
+        "frames",
+        "not tracking",
+        "swapped",
+        "away",
+        "inside out",
+        "swapped limbs",
     )
     return table(header, rows) if rows else "None."
 
@@ -207,7 +252,7 @@ def what_goes_wrong(s: RecordingScore) -> str:
             f"{JOINTS[j]} {100 * means[j]:.0f} cm (offset-free {100 * free[j]:.0f})" for j in order
         )
     ]
-    far = (s.distances_m > FAR_M).any(axis=1)
+    far: ndarray = np.any(s.distances_m > FAR_M, axis=1)
     if far.any():
         frames = np.flatnonzero(far)
         notes.append(
@@ -227,8 +272,13 @@ def what_goes_wrong(s: RecordingScore) -> str:
 
 def _scenes(scenes: Sequence[SceneScore]) -> str:
     header = (
-        "recording", "frames read", "ran to the end", "statuses", "PCK@0.2 %",
-        "over frames with a pose %", "joints compared",
+        "recording",
+        "frames read",
+        "ran to the end",
+        "statuses",
+        "PCK@0.2 %",
+        "over frames with a pose %",
+        "joints compared",
     )
     rows = [
         [

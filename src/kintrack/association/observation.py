@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
+from numba import njit
 from numpy import ndarray
 
 from kintrack.geometry import PinholeCamera
@@ -44,7 +45,21 @@ def observe(frame: Frame, max_width_px: int) -> Observation:
 
 def within(observation: Observation, box_camera: Float[ndarray, "2 3"]) -> Observation:
     """The observation restricted to points inside an axis-aligned box of the camera frame."""
-    low, high = box_camera
     p = observation.points_camera
-    inside = ((p >= low) & (p <= high)).all(axis=-1)
-    return Observation(observation.camera, p, observation.region & inside)
+    return Observation(observation.camera, p, _inside(p, observation.region, box_camera))
+
+
+@njit(cache=True)
+def _inside(points, region, box):
+    h, w = region.shape
+    out = np.zeros((h, w), dtype=np.bool_)
+    for i in range(h):
+        for j in range(w):
+            if not region[i, j]:
+                continue
+            inside = True
+            for k in range(3):
+                if points[i, j, k] < box[0, k] or points[i, j, k] > box[1, k]:
+                    inside = False
+            out[i, j] = inside
+    return out

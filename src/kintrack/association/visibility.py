@@ -36,7 +36,14 @@ def visible_vertices(
     half = camera.scaled(2)
     depth, _ = rasterise(vertices_camera, faces, half)
     return _visible(
-        vertices_camera, normals_camera, half.fx, half.fy, half.cx, half.cy, depth, facing,
+        vertices_camera,
+        normals_camera,
+        half.fx,
+        half.fy,
+        half.cx,
+        half.cy,
+        depth,
+        facing,
         tolerance_m,
     )
 

@@ -26,7 +26,7 @@ class Pairs(NamedTuple):
     """Vertex index."""
     points_camera: Float[ndarray, "n 3"]
     """Observed point, camera frame [m]."""
-    from_skin: Int[ndarray, ""]
+    from_skin: int
     """How many of the pairs were found from the skin; they come first."""
 
 

@@ -63,7 +63,9 @@ def draw_body(
     colors = np.asarray(PART_COLORS)[skin.labels[skin.faces[:, 0]]] * shade[:, None]
     picture = np.full((_CAMERA.height, _CAMERA.width, 3), 245, dtype=np.uint8)
     picture[face >= 0] = colors[face[face >= 0]].astype(np.uint8)
-    cv2.putText(picture, title, (8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (60, 60, 60), 1, cv2.LINE_AA)
+    cv2.putText(
+        picture, title, (8, 20), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (60, 60, 60), 1, cv2.LINE_AA
+    )
     return picture
 
 

@@ -120,4 +120,6 @@ def human_urdf(
         ET.SubElement(joint, "parent", link=parent)
         ET.SubElement(joint, "child", link=name)
     ET.indent(robot, "  ")
-    return '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(robot, encoding="unicode") + "\n"
+    return (
+        '<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(robot, encoding="unicode") + "\n"
+    )

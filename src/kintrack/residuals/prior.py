@@ -53,8 +53,6 @@ def diagonal_prior(q0: Float[ndarray, " nq"], sigma: Float[ndarray, " nv"]) -> T
     return TangentPrior(q0, np.diag(1.0 / sigma)[:, np.isfinite(sigma)])
 
 
-def gaussian_prior(
-    q0: Float[ndarray, " nq"], covariance: Float[ndarray, "nv nv"]
-) -> TangentPrior:
+def gaussian_prior(q0: Float[ndarray, " nq"], covariance: Float[ndarray, "nv nv"]) -> TangentPrior:
     """A full covariance in the tangent space at q0."""
     return TangentPrior(q0, np.linalg.cholesky(np.linalg.inv(covariance)))

@@ -73,8 +73,14 @@ class SurfaceResidual:
         """0.5 sum_i w_i |A_i d_i|^2."""
         skin, v = self.skin, self.vertex
         return _cost(
-            state.Ts_world_link, skin.links, skin.weights, skin.points_link, v,
-            self.points_world, self.roots, self.weights,
+            state.Ts_world_link,
+            skin.links,
+            skin.weights,
+            skin.points_link,
+            v,
+            self.points_world,
+            self.roots,
+            self.weights,
         )
 
 
@@ -260,7 +266,9 @@ def _link_blocks(Ts, links, skin_weights, points, observed, A, weights):
                 block = M[lb, links[i, c]]
                 for m in range(6):
                     k0, k1, k2 = (
-                        weights[i] * K[b, 0, m], weights[i] * K[b, 1, m], weights[i] * K[b, 2, m],
+                        weights[i] * K[b, 0, m],
+                        weights[i] * K[b, 1, m],
+                        weights[i] * K[b, 2, m],
                     )
                     for n in range(6):
                         block[m, n] += k0 * K[c, 0, n] + k1 * K[c, 1, n] + k2 * K[c, 2, n]

@@ -111,7 +111,9 @@ def solve(
         moved = False
         for _ in range(5):
             damped = H + np.diag(damping * np.diag(H) + 1e-9)
-            trial = run_kinematics(body, body.integrate(state.q, bounded_step(damped, g, low, high)))
+            trial = run_kinematics(
+                body, body.integrate(state.q, bounded_step(damped, g, low, high))
+            )
             trial_cost = sum(residual.cost(trial) for residual in residuals)
             if trial_cost < cost:
                 state, moved = trial, True

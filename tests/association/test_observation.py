@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import pytest
+
+from kintrack.association.observation import observe, within
+from kintrack.geometry import PinholeCamera
+from kintrack.sequence.frame import Frame
+
+CAMERA = PinholeCamera(width=640, height=481, fx=520.0, fy=525.0, cx=319.5, cy=240.0)
+
+
+@pytest.fixture
+def frame():
+    depth = np.random.default_rng(0).uniform(0.5, 5.0, (481, 640)).astype(np.float32)
+    depth[::3, ::5] = 0.0
+    depth[7, 11] = np.nan
+    return Frame(0, 0.0, CAMERA, depth)
+
+
+@pytest.mark.parametrize(
+    ("max_width_px", "factor"), [(640, 1), (5000, 1), (639, 2), (320, 2), (319, 3), (160, 4)]
+)
+def test_an_image_is_thinned_to_the_largest_width_that_is_allowed(frame, max_width_px, factor):
+    observation = observe(frame, max_width_px)
+    assert observation.camera == CAMERA.scaled(factor)
+    assert observation.camera.width <= max_width_px
+    assert observation.points_camera.shape == (
+        observation.camera.height,
+        observation.camera.width,
+        3,
+    )
+    expected = CAMERA.back_project(frame.depth_m)[::factor, ::factor]
+    assert np.allclose(observation.points_camera, expected, atol=1e-6)
+
+
+def test_the_region_is_every_pixel_with_a_reading(frame):
+    region = observe(frame, 640).region
+    assert not region[::3, ::5].any() and not region[7, 11]
+    assert region.sum() == np.count_nonzero(np.nan_to_num(frame.depth_m))
+
+
+def test_points_outside_a_box_leave_the_region_but_not_the_image(frame):
+    whole = observe(frame, 320)
+    box = np.array([[-0.5, -0.3, 1.0], [0.4, 0.6, 2.0]])
+    part = within(whole, box)
+    p = part.points_camera[part.region]
+    assert len(p) > 100
+    assert (p >= box[0]).all() and (p <= box[1]).all()
+    left_out = whole.points_camera[whole.region & ~part.region]
+    assert ((left_out < box[0]) | (left_out > box[1])).any(axis=1).all()
+    assert np.array_equal(part.points_camera, whole.points_camera)
+
+
+def test_pixels_without_a_reading_stay_out_even_if_the_box_holds_the_camera(frame):
+    part = within(observe(frame, 320), np.array([[-9.0] * 3, [9.0] * 3]))
+    assert np.array_equal(part.region, observe(frame, 320).region)
