@@ -90,7 +90,8 @@ def test_the_summary_tells_everything_about_the_run(fitted, sequence):
 
 def test_the_person_is_sized_and_can_be_loaded_again(fitted):
     human, T_world_camera = load_person(fitted[0] / "result")
-    assert len(human.shape) == 2 and np.abs(human.shape).max() > 0
+    assert len(human.shape) == StartConfig().shape_coefficients
+    assert np.abs(human.shape).max() > 0
     assert np.allclose(T_world_camera, T_LEVEL_WORLD_CAMERA)
     q = fitted[1].q[-1]
     vertices = posed_skin(human, q, T_world_camera)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -126,12 +127,14 @@ def test_two_runs_are_equal_to_the_bit(results, again):
 
 
 def without_left_arm(scene, human, q):
-    """Depth of the body with the pixels of the left arm masked away."""
+    """Depth of the body with something 1 m from the camera before the left arm."""
     vertices = skinned_vertices(run_kinematics(human.body, q), human.skin)
     vertices = transform_points(invert_rigid(T_LEVEL_WORLD_CAMERA), vertices)
     depth, face = rasterise(vertices, human.skin.faces, scene.camera)
     on_arm = (human.skin.labels == 4)[human.skin.faces].any(axis=1)
-    return np.where((face >= 0) & ~on_arm[face], depth, 0.0).astype(np.float32)
+    arm = ((face >= 0) & on_arm[face]).astype(np.uint8)
+    hidden = cv2.dilate(arm, np.ones((9, 9), np.uint8)) > 0
+    return np.where(hidden, 1.0, np.where(face >= 0, depth, 0.0)).astype(np.float32)
 
 
 def test_a_limb_without_data_stays_predicted_and_its_doubt_grows(scene, human, after):
@@ -149,7 +152,9 @@ def test_a_limb_without_data_stays_predicted_and_its_doubt_grows(scene, human, a
     assert blind[-1].joint_visible[hand] < 0.1 < blind[-1].joint_visible[other]
     errors = scene.errors(q, blind[-1].joint_positions_camera_m)
     assert np.delete(errors, LEFT_ARM).mean() < 0.02
-    assert errors[LEFT_ARM].max() < 0.20  # it stood still, so the prediction is where it was
+    for joint in LEFT_ARM:  # whatever it drifted lies within three of its own standard deviations
+        covariance = blind[-1].joint_covariances_m2[joint]
+        assert errors[joint] < 3 * np.sqrt(np.linalg.eigvalsh(covariance).max())
 
 
 @pytest.mark.parametrize("kind", ["unreadable", "without depth", "all zero", "all NaN"])

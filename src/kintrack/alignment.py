@@ -91,7 +91,12 @@ def fit_pose(
     """
     T_camera_world = invert_rigid(T_world_camera)
     R = T_world_camera[:3, :3]
-    state, damping, iterations, surface = run_kinematics(human.body, q), config.solver.damping, 0, None
+    state, damping, iterations, surface = (
+        run_kinematics(human.body, q),
+        config.solver.damping,
+        0,
+        None,
+    )
     outline = silhouette(observation)
     remaining = list(gates_m)
     while remaining:
@@ -99,13 +104,20 @@ def fit_pose(
         view = view_skin(human, state, T_camera_world, observation, config)
         clock("skin")
         pairs = associate(
-            observation, view.vertices_camera, view.visible,
-            config.association.gate_m, gate_m,
+            observation,
+            view.vertices_camera,
+            view.visible,
+            config.association.gate_m,
+            gate_m,
             config.association.pixel_pairs,
         )
         beside = outside_pairs(
-            outline, observation, view.vertices_camera, view.visible,
-            config.association.silhouette_tolerance_m, config.association.silhouette_gate_m,
+            outline,
+            observation,
+            view.vertices_camera,
+            view.visible,
+            config.association.silhouette_tolerance_m,
+            config.association.silhouette_gate_m,
         )
         clock("associate")
         vertices_world = transform_points(T_world_camera, view.vertices_camera)

@@ -94,7 +94,7 @@ class Body:
         return self.model.joints[self.model.getJointId(joint)].idx_v
 
     def integrate(self, q: Float[ndarray, " nq"], v: Float[ndarray, " nv"]) -> ndarray:
-        """q moved by the tangent vector v (`pin.integrate`)."""
+        """Q moved by the tangent vector v (`pin.integrate`)."""
         return pin.integrate(self.model, q, v)
 
     def difference(self, q0: Float[ndarray, " nq"], q1: Float[ndarray, " nq"]) -> ndarray:
@@ -121,15 +121,25 @@ class BodyState:
     """Reported joint centres [m], order of `JOINT_NAMES`."""
 
 
-def read_arrays(path: Path) -> dict[str, ndarray]:
+def read_arrays(path: Path, *needed: str) -> dict[str, ndarray]:
     """The arrays of one file of the model.
 
+    Args:
+        path: File (npz).
+        needed: Names of the arrays that must be there.
+
+    Returns:
+        The needed arrays by name.
+
     Raises:
-        ModelError: if the file is missing or broken.
+        ModelError: if the file is missing or broken, or lacks an array.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+            missing = sorted(set(needed) - set(file.files))
+            if missing:
+                raise ModelError(f"{path}: lacks the arrays {', '.join(missing)}")
+            return {name: file[name] for name in needed}
     except (OSError, ValueError, EOFError, BadZipFile) as error:
         raise ModelError(f"{path}: cannot be read as part of the model ({error})") from error
 
@@ -142,7 +152,7 @@ class Rig:
     """Links that carry skin, parents before children."""
     Ts_root_link: Float[ndarray, "l 4 4"]
     """Bind pose of the links, for the given shape."""
-    extra_offsets: dict[str, Float[ndarray, "3"]]
+    extra_offsets: dict[str, Float[ndarray, 3]]
     """Change of the fixed frames that are no link's origin, root axes [m]."""
     explained: Float[ndarray, " k"]
     """Share of the population's variance that each shape coefficient explains."""
@@ -161,7 +171,15 @@ def load_rig(folder: Path, shape: Float[ndarray, " k"] | None = None) -> Rig:
     Raises:
         ModelError: if a file is broken or there are more coefficients than the model has.
     """
-    arrays = read_arrays(folder / "skin" / "rig.npz")
+    arrays = read_arrays(
+        folder / "skin" / "rig.npz",
+        "link_names",
+        "Ts_root_link_bind",
+        "origins_basis_m",
+        "extra_names",
+        "extra_basis_m",
+        "explained_variance",
+    )
     Ts = arrays["Ts_root_link_bind"].copy()
     origins, extra = arrays["origins_basis_m"], arrays["extra_basis_m"]
     b = shape_coefficients(shape, len(origins))

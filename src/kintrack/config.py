@@ -4,17 +4,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from kintrack.errors import ConfigError
 
 
 def _check(config, **bounds: tuple[float, float]) -> None:
+    whole = {f.name for f in fields(config) if f.type in (int, "int")}
     for name, (low, high) in bounds.items():
         value = getattr(config, name)
-        if not (math.isfinite(value) and low <= value <= high):
+        right_kind = name not in whole or isinstance(value, int)
+        if not (right_kind and math.isfinite(value) and low <= value <= high):
+            kind = ", whole numbers only" if name in whole else ""
             raise ConfigError(
-                f"{type(config).__name__}.{name} = {value!r}: {low:g} to {high:g} are allowed"
+                f"{type(config).__name__}.{name} = {value!r}: {low:g} to {high:g} are allowed{kind}"
             )
 
 
@@ -30,7 +33,7 @@ class AssociationConfig:
     """Largest distance between a point and the vertex it takes in a frame's first round [m]."""
     last_gate_m: float = 0.10
     """The same in the last round [m]."""
-    silhouette_tolerance_m: float = 0.03
+    silhouette_tolerance_m: float = 0.015
     """How far outside the silhouette a vertex may project [m]."""
     silhouette_gate_m: float = 0.4
     """Vertices further outside than this are left alone [m]."""
@@ -42,6 +45,9 @@ class AssociationConfig:
     """A vertex further than this behind the body's own depth buffer is hidden [m]."""
     pixel_pairs: int = 700
     """About how many observed pixels look for their vertex."""
+    background_share: float = 0.5
+    """With readings on fewer of the pixels than this, the background was taken out and an empty
+    pixel is free space; with more, an empty pixel is the sensor's failure and says nothing."""
     region_margin_m: float = 0.35
     """Observed points further than this from the predicted body's box are ignored [m]."""
 
@@ -58,6 +64,7 @@ class AssociationConfig:
             facing=(0.0, 1.0),
             self_occlusion_m=(0.0, 1.0),
             pixel_pairs=(0, 20_000),
+            background_share=(0.0, 1.0),
             region_margin_m=(0.05, 5.0),
         )
 
@@ -92,15 +99,23 @@ class SurfaceConfig:
 class PriorConfig:
     """What is known before a frame is seen."""
 
-    limb_rad: float = 0.8
+    limb_rad: float = 0.4
     """Standard deviation of arm and leg hinges about the resting pose [rad]."""
-    trunk_rad: float = 0.3
+    trunk_rad: float = 0.15
     """Standard deviation of spine, neck, head and clavicle hinges about zero [rad]."""
     twist_rad: float = 0.5
     """Standard deviation of forearm, wrist and ankle hinges about zero [rad]."""
+    unseen_s: float = 2.0
+    """Time in which a limb that nobody sees relaxes towards rest [s]."""
 
     def __post_init__(self) -> None:
-        _check(self, limb_rad=(0.01, 10), trunk_rad=(0.01, 10), twist_rad=(0.01, 10))
+        _check(
+            self,
+            limb_rad=(0.01, 10),
+            trunk_rad=(0.01, 10),
+            twist_rad=(0.01, 10),
+            unseen_s=(0.01, 1e4),
+        )
 
 
 @dataclass(frozen=True)
@@ -143,9 +158,7 @@ class SolverConfig:
     """Stop when no reported joint moves further than this in a round [m]."""
 
     def __post_init__(self) -> None:
-        _check(
-            self, rounds=(1, 100), steps=(1, 100), damping=(0, 1e6), tolerance_m=(0, 1)
-        )
+        _check(self, rounds=(1, 100), steps=(1, 100), damping=(0, 1e6), tolerance_m=(0, 1))
 
 
 @dataclass(frozen=True)
@@ -160,8 +173,8 @@ class StartConfig:
     """Blobs further away are ignored [m]."""
     rounds: int = 14
     """Associations per guess."""
-    shape_coefficients: int = 2
-    """Leading shape coefficients (stature, build) sized at the start; 0 keeps the given body."""
+    shape_coefficients: int = 3
+    """Leading shape coefficients (stature, build, sex) sized at the start; 0 for none."""
     shape_limit: float = 2.5
     """Largest shape coefficient [standard deviations]."""
 
@@ -192,6 +205,8 @@ class JudgeConfig:
     """Least share of the observed region within `explained_m` of the skin."""
     min_supported: float = 0.45
     """Least share of the facing skin with an observed point within `explained_m`."""
+    start_explained: float = 0.9
+    """Least share of the person's blob within `explained_m` of the skin at a start."""
     explained_m: float = 0.06
     """Distance at which a point explains the skin and the reverse [m]."""
     patience: int = 3
@@ -203,6 +218,7 @@ class JudgeConfig:
             max_rms_m=(1e-3, 1),
             min_explained=(0, 1),
             min_supported=(0, 1),
+            start_explained=(0, 1),
             explained_m=(1e-3, 1),
             patience=(1, 1000),
         )

@@ -30,6 +30,13 @@ SITTING_DEG = {
 }
 """Sitting on a chair [deg]."""
 
+ARMS_OUT_DEG = {**RESTING_DEG, "shoulder_elevation": 80.0, "shoulder_plane": -25.0}
+"""Arms to the sides [deg]."""
+ARMS_UP_DEG = {**RESTING_DEG, "shoulder_elevation": 150.0, "clavicle_elevation": 20.0}
+"""Arms overhead [deg]."""
+REACHING_DEG = {**RESTING_DEG, "shoulder_elevation": 40.0, "shoulder_plane": 55.0}
+"""Arms to the front [deg]."""
+
 _TRUNK = ("spine", "chest", "neck", "head", "clavicle")
 _TWIST = ("forearm", "wrist", "ankle")
 

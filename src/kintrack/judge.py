@@ -10,11 +10,10 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 from scipy.spatial import cKDTree
 
+from kintrack.alignment import View
 from kintrack.association.observation import Observation
 from kintrack.association.window import associate, sample_region
 from kintrack.config import JudgeConfig
-from kintrack.alignment import View
-
 
 SAMPLES = 600
 """About how many observed points are asked whether the skin explains them."""

@@ -60,7 +60,15 @@ def load_skin(
         raise ModelError(f"skin resolution {resolution!r}: 'tracking' or 'display' are allowed")
     folder = model_folder() if folder is None else folder
     rig = load_rig(folder, shape)
-    skin = read_arrays(folder / "skin" / f"{resolution}.npz")
+    skin = read_arrays(
+        folder / "skin" / f"{resolution}.npz",
+        "vertices_m",
+        "faces",
+        "weight_links",
+        "weights",
+        "labels",
+        "shape_basis_m",
+    )
     links = skin["weight_links"].astype(np.int64)
     Ts_link_root = invert_rigid(rig.Ts_root_link)[links]
     basis = skin["shape_basis_m"]

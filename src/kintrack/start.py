@@ -8,28 +8,46 @@ barely tells a chest from a back, so of two equally good guesses the one facing 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numba import njit
 from numpy import ndarray
 
+from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.association.observation import Observation
 from kintrack.body import run_kinematics
 from kintrack.config import StartConfig, TrackerConfig
 from kintrack.errors import AssociationError
-from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.geometry import invert_rigid, transform_points
-from kintrack.human import RESTING_DEG, SITTING_DEG, Human, load_human, posed, prior_sigma
+from kintrack.human import (
+    ARMS_OUT_DEG,
+    ARMS_UP_DEG,
+    REACHING_DEG,
+    RESTING_DEG,
+    SITTING_DEG,
+    Human,
+    load_human,
+    posed,
+    prior_sigma,
+)
 from kintrack.judge import Agreement, agreement, distance_between
 from kintrack.residuals.prior import diagonal_prior
 from kintrack.skin import skinned_vertices
 
-HEADINGS_DEG = (0.0, -50.0, 50.0)
-"""Guesses of where the chest points, 0 = at the camera [deg]."""
-POSTURES = (RESTING_DEG, SITTING_DEG)
-"""Guesses of the posture."""
+GUESSES = (
+    (RESTING_DEG, 0.0),
+    (RESTING_DEG, -50.0),
+    (RESTING_DEG, 50.0),
+    (SITTING_DEG, 0.0),
+    (SITTING_DEG, -50.0),
+    (SITTING_DEG, 50.0),
+    (ARMS_OUT_DEG, 0.0),
+    (ARMS_UP_DEG, 0.0),
+    (REACHING_DEG, 0.0),
+)
+"""Posture and where the chest points, 0 = at the camera [deg]."""
 EDGE_M = 0.12
 """Depth step between neighbouring cells that parts two things [m]."""
 
@@ -63,22 +81,44 @@ def find_person(
     points = observation.points_camera[::cell, ::cell]
     valid = observation.region[::cell, ::cell] & (points[..., 2] <= config.max_distance_m)
     blob = _components(points[..., 2], valid, EDGE_M)
-    best, best_distance = -1, np.inf
-    sizes = np.bincount(blob[blob >= 0], minlength=1) if (blob >= 0).any() else np.zeros(0)
-    for i in np.flatnonzero(sizes >= 60):
-        p = points[blob == i]
-        world = transform_points(T_world_camera, p)
-        height = np.ptp(np.quantile(world[:, 2], [0.01, 0.99]))
-        distance = float(np.median(p[:, 2]))
-        across = np.ptp(np.quantile(p[:, 0], [0.02, 0.98]))
-        fits = config.min_height_m <= height <= config.max_height_m and 0.2 <= across <= 2.2
-        if fits and distance < best_distance:
-            best, best_distance = i, distance
-    if best < 0:
+    sizes = np.bincount(blob[valid], minlength=1)
+    pieces = {i: points[blob == i] for i in np.flatnonzero(sizes >= LEAST_CELLS)}
+    people = [i for i, p in pieces.items() if _person_sized(p, T_world_camera, config)]
+    if not people:
         return None
-    mask = np.repeat(np.repeat(blob == best, cell, axis=0), cell, axis=1)
+    nearest = min(people, key=lambda i: float(np.median(pieces[i][:, 2])))
+    taken, person = [nearest], pieces[nearest]
+    for i in sorted(pieces, key=lambda i: -sizes[i]):
+        joined = np.concatenate([person, pieces[i]])
+        if i != nearest and _touch(person, pieces[i]):
+            if _person_sized(joined, T_world_camera, config):
+                taken, person = [*taken, i], joined
+    whole = np.kron(np.where(np.isin(blob, taken), points[..., 2], np.nan), np.ones((cell, cell)))
     h, w = observation.region.shape
-    return mask[:h, :w] & observation.region
+    rim = np.abs(observation.points_camera[..., 2] - whole[:h, :w]) <= EDGE_M
+    return rim & observation.region
+
+
+LEAST_CELLS = 20
+"""Smaller pieces of the depth image are ignored."""
+GAP_M = np.array([0.08, 0.08, 0.4])
+"""Pieces this near in x, y and z may be one person, parted by an arm in front [m]."""
+
+
+def _person_sized(
+    points_camera: Float[ndarray, "n 3"], T_world_camera: Float[ndarray, "4 4"], config: StartConfig
+) -> bool:
+    """True if some points have a person's height and width."""
+    world = transform_points(T_world_camera, points_camera)
+    height = np.ptp(np.quantile(world[:, 2], [0.01, 0.99]))
+    across = np.ptp(np.quantile(points_camera[:, 0], [0.02, 0.98]))
+    return bool(config.min_height_m <= height <= config.max_height_m and 0.2 <= across <= 2.2)
+
+
+def _touch(a: Float[ndarray, "n 3"], b: Float[ndarray, "m 3"]) -> bool:
+    """True if the bounding boxes of two pieces are no further apart than `GAP_M`."""
+    gap = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))
+    return bool((gap <= GAP_M).all())
 
 
 def start(
@@ -101,26 +141,24 @@ def start(
     mask = find_person(observation, T_world_camera, config.start)
     if mask is None:
         return None
-    seen = Observation(observation.camera, observation.points_camera, mask)
+    seen = replace(observation, region=mask)
     T_camera_world = invert_rigid(T_world_camera)
-    gates = np.geomspace(
-        config.association.start_gate_m, config.association.last_gate_m, config.start.rounds
-    )
+    a = config.association
+    gates = np.geomspace(a.start_gate_m, a.last_gate_m, config.start.rounds).tolist()
     best, best_score = None, -np.inf
-    for posture in POSTURES:
-        for heading in HEADINGS_DEG:
-            q = _placed(human, seen, T_world_camera, posture, np.radians(heading))
-            prior = diagonal_prior(q, prior_sigma(human.body, config.prior))
-            try:
-                fit = fit_pose(human, seen, q, [prior], T_world_camera, config, gates)
-            except AssociationError:
-                continue
-            view = view_skin(human, fit.state, T_camera_world, seen, config)
-            agreed = agreement(view, seen, config.judge.explained_m)
-            score = agreed.explained + agreed.supported - fit.surface.rms_m / 0.03
-            score -= 0.02 * abs(heading) / 50 + prior.cost(fit.state) / 500
-            if score > best_score:
-                best, best_score = Start(fit, agreed, seen), score
+    for posture, heading in GUESSES:
+        q = _placed(human, seen, T_world_camera, posture, np.radians(heading))
+        prior = diagonal_prior(q, prior_sigma(human.body, config.prior))
+        try:
+            fit = fit_pose(human, seen, q, [prior], T_world_camera, config, gates)
+        except AssociationError:
+            continue
+        view = view_skin(human, fit.state, T_camera_world, seen, config)
+        agreed = agreement(view, seen, config.judge.explained_m)
+        score = agreed.explained + agreed.supported - fit.surface.rms_m / 0.03
+        score -= 0.02 * abs(heading) / 50 + prior.cost(fit.state) / 500
+        if score > best_score:
+            best, best_score = Start(fit, agreed, seen), score
     return best
 
 

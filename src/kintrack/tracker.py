@@ -8,24 +8,29 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray
+from threadpoolctl import ThreadpoolController
 
+from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.association.observation import Observation, observe, within
 from kintrack.body import joint_jacobians, run_kinematics
 from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
-from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
 from kintrack.human import RESTING_DEG, Human, load_human, motion_sigma, posed, prior_sigma
 from kintrack.joints import JOINT_NAMES
 from kintrack.judge import acceptable, agreement, joint_visibility
-from kintrack.residuals.prior import diagonal_prior, gaussian_prior
+from kintrack.residuals.prior import TangentPrior, diagonal_prior, gaussian_prior
 from kintrack.result import FrameResult
 from kintrack.sequence.frame import Frame
 from kintrack.skin import skinned_vertices
 from kintrack.solver.gauss_newton import normal_equations
 from kintrack.start import sized, start
+
+NONE = np.zeros(0, dtype=np.int64)
+UNSEEN_SHARE = 0.08
+"""A hinge that moves skin of which less than this share is observed counts as not seen."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +71,14 @@ class Tracker:
         self.T_world_camera = T_world_camera
         self.belief: Belief | None = None
         self._clock = clock
+        self._threads = ThreadpoolController()
         self._meet(load_human() if human is None else human)
 
     def _meet(self, human: Human) -> None:
-        """Take this person's body, with the pose prior that belongs to it."""
+        """Take this person's body and what belongs to it."""
         self.human = human
-        resting = posed(human.body, RESTING_DEG)
-        self._pose_prior = diagonal_prior(resting, prior_sigma(human.body, self.config.prior))
+        self._resting = posed(human.body, RESTING_DEG)
+        self._prior_sigma = prior_sigma(human.body, self.config.prior)
 
     def step(self, frame: Frame) -> FrameResult:
         """Fit the body to the next frame.
@@ -83,41 +89,61 @@ class Tracker:
         Returns:
             Pose, joints, covariances and status.
         """
+        with self._threads.limit(limits=1, user_api="blas"):
+            return self._step(frame)
+
+    def _step(self, frame: Frame) -> FrameResult:
         began = time.perf_counter()
         if frame.problem is not None or frame.depth_m is None:
             return self._nothing(frame, "skipped", began, frame.problem or "no depth")
-        observation = observe(frame, self.config.association.max_width_px)
+        config, a = self.config, self.config.association
+        observation = observe(frame, a.max_width_px, a.background_share)
+        if not observation.region.any():
+            return self._nothing(frame, "skipped", began, "no depth reading")
         if self.belief is None:
             return self._start(frame, observation, began)
-        config, body = self.config, self.human.body
         predicted, covariance = self._predict(self.belief, frame.timestamp_s)
         observation = within(observation, self._box(predicted))
         self._clock("observe")
-        priors = [gaussian_prior(predicted, covariance), self._pose_prior]
-        gates = np.geomspace(
-            config.association.first_gate_m, config.association.last_gate_m, config.solver.rounds
-        )
+        unseen = self._unseen(predicted, observation)
+        dt_s = max(frame.timestamp_s - self.belief.timestamp_s, 1e-3)
+        priors = [gaussian_prior(predicted, covariance), self._pose_prior(unseen, dt_s)]
+        gates = np.geomspace(a.first_gate_m, a.last_gate_m, config.solver.rounds).tolist()
         try:
             fit = fit_pose(
-                self.human, observation, predicted, priors, self.T_world_camera, config, gates,
+                self.human,
+                observation,
+                predicted,
+                priors,
+                self.T_world_camera,
+                config,
+                gates,
                 self._clock,
             )
         except AssociationError:
             return self._miss(frame, began)
-        return self._report(frame, observation, fit, priors, began)
+        return self._report(frame, observation, fit, priors, unseen, began)
 
     def _start(self, frame: Frame, observation: Observation, began: float) -> FrameResult:
         """First frame, or the first after a loss: find the person and fit from several guesses."""
         found = start(self.human, observation, self.T_world_camera, self.config)
-        if found is not None and len(self.human.shape) == 0 and self.config.start.shape_coefficients:
+        if (
+            found is not None
+            and len(self.human.shape) == 0
+            and self.config.start.shape_coefficients
+        ):
             person, found = sized(self.human, found, self.T_world_camera, self.config)
             self._meet(person)
         self._clock("start")
-        if found is None or not acceptable(
-            found.agreed, found.fit.surface.rms_m, self.config.judge
+        judge = self.config.judge
+        if (
+            found is None
+            or found.agreed.explained < judge.start_explained
+            or not acceptable(found.agreed, found.fit.surface.rms_m, judge)
         ):
             return self._nothing(frame, "initialising", began)
-        return self._report(frame, found.observation, found.fit, [self._pose_prior], began)
+        priors = [diagonal_prior(self._resting, self._prior_sigma)]
+        return self._report(frame, found.observation, found.fit, priors, NONE, began)
 
     def _predict(self, belief: Belief, timestamp_s: float) -> tuple[ndarray, ndarray]:
         """Constant velocity within the limits, and how sure it is."""
@@ -126,6 +152,25 @@ class Tracker:
         q = body.integrate(belief.q, belief.velocity * motion.damping * dt)
         q[7:] = np.clip(q[7:], body.lower[6:], body.upper[6:])
         return q, belief.covariance + np.diag(motion_sigma(body, motion, dt) ** 2)
+
+    def _unseen(
+        self, predicted: Float[ndarray, " nq"], observation: Observation
+    ) -> Int[ndarray, " n"]:
+        """Hinges of which hardly any skin that they move is observed where it is expected."""
+        state = run_kinematics(self.human.body, predicted)
+        T_camera_world = invert_rigid(self.T_world_camera)
+        view = view_skin(self.human, state, T_camera_world, observation, self.config)
+        supported = agreement(view, observation, self.config.judge.explained_m).vertex_supported
+        body, owner = self.human.body, self.human.skin.links[:, 0]
+        seen = np.bincount(owner, supported, minlength=len(body.link_names)) @ body.support
+        moved = np.bincount(owner, minlength=len(body.link_names)) @ body.support
+        return np.flatnonzero(seen < UNSEEN_SHARE * moved)
+
+    def _pose_prior(self, unseen: Int[ndarray, " n"], dt_s: float) -> TangentPrior:
+        """Towards rest; slowly for limbs that were not seen, so that they stay predicted."""
+        sigma = self._prior_sigma.copy()
+        sigma[unseen] *= np.sqrt(max(self.config.prior.unseen_s / dt_s, 1.0))
+        return diagonal_prior(self._resting, sigma)
 
     def _box(self, q: Float[ndarray, " nq"]) -> Float[ndarray, "2 3"]:
         """Camera-frame box around the predicted skin, grown by the region's margin [m]."""
@@ -137,7 +182,13 @@ class Tracker:
         return np.stack([vertices.min(axis=0) - margin, vertices.max(axis=0) + margin])
 
     def _report(
-        self, frame: Frame, observation: Observation, fit: Fit, priors: list, began: float
+        self,
+        frame: Frame,
+        observation: Observation,
+        fit: Fit,
+        priors: list[TangentPrior],
+        unseen: Int[ndarray, " n"],
+        began: float,
     ) -> FrameResult:
         """Judge the fit, update the belief, and say how sure every joint is."""
         config, body = self.config, self.human.body
@@ -147,7 +198,7 @@ class Tracker:
         good = acceptable(agreed, fit.surface.rms_m, config.judge)
         H, _, _ = normal_equations(fit.state, [fit.surface, *priors])
         covariance = np.linalg.inv(H + 1e-9 * np.eye(body.nv))
-        self.belief = self._update(fit, covariance, frame.timestamp_s, good)
+        self.belief = self._update(fit, covariance, unseen, frame.timestamp_s, good)
         R = T_camera_world[:3, :3]
         J = R @ joint_jacobians(fit.state)
         positions = transform_points(T_camera_world, fit.state.joint_positions_world)
@@ -166,7 +217,14 @@ class Tracker:
         self._clock("report")
         return result
 
-    def _update(self, fit: Fit, covariance: ndarray, timestamp_s: float, good: bool):
+    def _update(
+        self,
+        fit: Fit,
+        covariance: ndarray,
+        unseen: Int[ndarray, " n"],
+        timestamp_s: float,
+        good: bool,
+    ) -> Belief | None:
         """The belief after a frame; None once too many bad frames came in a row."""
         body, last = self.human.body, self.belief
         if last is None:
@@ -176,6 +234,7 @@ class Tracker:
             return None
         dt = max(timestamp_s - last.timestamp_s, 1e-3)
         velocity = body.difference(last.q, fit.state.q) / dt
+        velocity[unseen] = self.config.motion.damping * last.velocity[unseen]
         return Belief(fit.state.q, velocity, covariance, timestamp_s, misses)
 
     def _miss(self, frame: Frame, began: float) -> FrameResult:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -24,14 +24,17 @@ class Observation:
     """Point of every pixel, camera frame [m]; z = 0 where there is none."""
     region: Bool[ndarray, "h w"]
     """Pixels that may belong to the person."""
+    has_background: bool = False
+    """True if an empty pixel is the sensor's failure, not free space."""
 
 
-def observe(frame: Frame, max_width_px: int) -> Observation:
+def observe(frame: Frame, max_width_px: int, background_share: float = 0.5) -> Observation:
     """Back-project a frame, thinned to at most `max_width_px` columns.
 
     Args:
         frame: A good frame.
         max_width_px: Largest working width [px].
+        background_share: Share of pixels with a reading from which a background is assumed.
 
     Returns:
         The observation; its region is every pixel with a reading.
@@ -40,13 +43,14 @@ def observe(frame: Frame, max_width_px: int) -> Observation:
     factor = -(-frame.camera.width // max_width_px)
     camera = frame.camera.scaled(factor)
     points = camera.back_project(frame.depth_m[::factor, ::factor])
-    return Observation(camera, points, points[..., 2] > 0)
+    read = points[..., 2] > 0
+    return Observation(camera, points, read, bool(read.mean() >= background_share))
 
 
 def within(observation: Observation, box_camera: Float[ndarray, "2 3"]) -> Observation:
     """The observation restricted to points inside an axis-aligned box of the camera frame."""
-    p = observation.points_camera
-    return Observation(observation.camera, p, _inside(p, observation.region, box_camera))
+    inside = _inside(observation.points_camera, observation.region, box_camera)
+    return replace(observation, region=inside)
 
 
 @njit(cache=True)

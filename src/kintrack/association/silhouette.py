@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Skin that projects beside the person must come back: pairs with the nearest silhouette pixel.
 
-Window search says nothing about a limb that sticks out where nothing was observed near. Such a
-vertex is drawn, across its ray and at its own depth, to the nearest pixel of the region.
+Window search says nothing about a limb that sticks out where nothing was observed near. Where the
+camera looks past such a vertex, at something behind it or at nothing at all in a recording without
+background, the vertex is drawn, across its ray and at its own depth, to the nearest pixel of the
+region. Where something nearer stands in the way, or the sensor failed, nothing follows.
 """
 
 from __future__ import annotations
@@ -27,22 +29,25 @@ class SilhouettePairs(NamedTuple):
 
 
 class Silhouette(NamedTuple):
-    """Nearest region pixel of every pixel."""
+    """Nearest allowed pixel of every pixel."""
 
     distance_px: Float[ndarray, "h w"]
-    """Distance to the region [px]; 0 inside."""
+    """Distance to an allowed pixel [px]; 0 inside."""
     nearest: Int[ndarray, "h w"]
-    """Flat index of the nearest region pixel."""
+    """Flat index of the nearest allowed pixel."""
 
 
 def silhouette(observation: Observation) -> Silhouette:
-    """Distance transform of the observation's region."""
-    outside = (~observation.region).astype(np.uint8)
+    """Distance transform of where the person may be: the region, and behind anything nearer."""
+    z = observation.points_camera[..., 2]
+    nearest = np.quantile(z[observation.region], 0.01) if observation.region.any() else 0.0
+    allowed = observation.region | ((z > 0) & (z < nearest))
+    outside = (~allowed).astype(np.uint8)
     distance, label = cv2.distanceTransformWithLabels(
         outside, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
     place = np.zeros(int(label.max()) + 1, dtype=np.int64)
-    inside = np.flatnonzero(observation.region)
+    inside = np.flatnonzero(allowed)
     place[label.ravel()[inside]] = inside
     return Silhouette(distance, place[label])
 
@@ -74,7 +79,9 @@ def outside_pairs(
     u = np.clip(np.floor(camera.fx * x / z + camera.cx + 0.5), 0, camera.width - 1).astype(int)
     v = np.clip(np.floor(camera.fy * y / z + camera.cy + 0.5), 0, camera.height - 1).astype(int)
     away_m = shape.distance_px[v, u] * z / camera.fx
-    out = (away_m > tolerance_m) & (away_m < gate_m)
+    seen_m = observation.points_camera[v, u, 2]
+    free = np.where(seen_m > 0, seen_m > z, not observation.has_background)
+    out = free & (away_m > tolerance_m) & (away_m < gate_m)
     row, column = np.divmod(shape.nearest[v[out], u[out]], camera.width)
     z = z[out]
     points = np.stack(

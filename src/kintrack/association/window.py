@@ -58,8 +58,14 @@ def associate(
     index = np.flatnonzero(visible)
     camera = observation.camera
     pixel = _search(
-        vertices_camera[index], observation.points_camera, observation.region,
-        camera.fx, camera.fy, camera.cx, camera.cy, gate_m,
+        vertices_camera[index],
+        observation.points_camera,
+        observation.region,
+        camera.fx,
+        camera.fy,
+        camera.cx,
+        camera.cy,
+        gate_m,
     )
     found = pixel >= 0
     flat = observation.points_camera.reshape(-1, 3)
@@ -67,9 +73,8 @@ def associate(
     n = len(vertex)
     if pixel_pairs and len(index):
         seen = sample_region(observation, pixel_pairs)
-        distance, nearest = cKDTree(vertices_camera[index]).query(
-            seen, distance_upper_bound=pixel_gate_m
-        )
+        tree = cKDTree(vertices_camera[index])
+        distance, nearest = map(np.asarray, tree.query(seen, distance_upper_bound=pixel_gate_m))
         near = np.isfinite(distance)
         vertex = np.concatenate([vertex, index[nearest[near]]])
         points = np.concatenate([points, seen[near]])

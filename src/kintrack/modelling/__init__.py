@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How `model/` is made: the human's URDF and skins from the `anny` body (needs the extra `model`)."""
+"""How `model/` is made: URDF and skins from the `anny` body (needs the extra `model`)."""

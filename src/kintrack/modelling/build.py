@@ -159,6 +159,6 @@ def _save_visuals(folder: Path, source: SourceBody, Ts_root_link) -> dict[str, s
             (source.vertices - T[:3, 3]) @ T[:3, :3], source.faces[face_owner == i], process=False
         )
         piece.remove_unreferenced_vertices()
-        (folder / f"{link.name}.stl").write_bytes(piece.export(file_type="stl"))
+        piece.export(folder / f"{link.name}.stl", file_type="stl")
         files[link.name] = f"skin/visual/{link.name}.stl"
     return files

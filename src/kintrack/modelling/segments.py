@@ -48,7 +48,7 @@ class SegmentBody:
 
     mass_kg: float
     """Mass [kg]."""
-    center_m: Float[ndarray, "3"]
+    center_m: Float[ndarray, 3]
     """Centre of mass [m]."""
     inertia_kgm2: Float[ndarray, "3 3"]
     """Inertia about the centre of mass, link axes [kg m^2]."""

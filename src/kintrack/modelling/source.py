@@ -29,7 +29,7 @@ class SourceBody:
     """Triangles, outward counter-clockwise; the outer surface and the eyes."""
     weights: Float[ndarray, "v l"]
     """Skinning weights over `links()`, rows sum to 1."""
-    points: dict[str, Float[ndarray, "3"]]
+    points: dict[str, Float[ndarray, 3]]
     """Mean link origins and `EXTRA_POINTS` [m]."""
     vertices_basis: Float[ndarray, "k v 3"]
     """Change of the vertices per standard deviation of each shape coefficient [m]."""
@@ -37,7 +37,7 @@ class SourceBody:
     """Change of `points` per standard deviation [m]."""
     explained: Float[ndarray, " k"]
     """Share of the population's vertex variance per coefficient."""
-    landmarks: dict[str, Float[ndarray, "3"]]
+    landmarks: dict[str, Float[ndarray, 3]]
     """Points that only orient frames: knuckles and toes [m]."""
 
 

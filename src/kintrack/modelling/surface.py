@@ -24,8 +24,9 @@ def remesh(
 ) -> tuple[Float[ndarray, "t 3"], Int[ndarray, "g 3"]]:
     """A closed, evenly sampled mesh of about `target_vertices` around the same body.
 
-    Each hand becomes the convex hull of its fingers. Voxels inside the body are closed morphologically, the surface is extracted by marching cubes,
-    remeshed isotropically and laid back onto the body wherever that is within 8 mm.
+    Each hand becomes the convex hull of its fingers. Voxels inside the body are closed
+    morphologically, the surface is extracted by marching cubes, remeshed isotropically and laid
+    back onto the body wherever that is within 8 mm.
 
     Args:
         vertices: Source vertices [m].
@@ -120,7 +121,7 @@ def smooth_weights(
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     ones = np.ones(len(edges))
     ring = sparse.coo_matrix((ones, (edges[:, 0], edges[:, 1])), shape=(n, n))
-    ring = ((ring + ring.T) > 0).astype(float)
+    ring = (ring + ring.T).sign()
     mean = sparse.diags(1 / np.maximum(np.asarray(ring.sum(axis=1)).ravel(), 1)) @ ring
     for _ in range(rounds):
         weights = 0.5 * weights + 0.5 * (mean @ weights)

@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Terms of the objective, one file each."""

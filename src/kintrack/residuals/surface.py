@@ -48,7 +48,7 @@ class SurfaceResidual:
         return skinned_vertices(state, self.skin)[self.vertex] - self.points_world
 
     def linearize(self, state: BodyState) -> Linearization:
-        """r = A_i d_i, rows of one pair together, shape (3 N,) [m]."""
+        """R = A_i d_i, rows of one pair together, shape (3 N,) [m]."""
         r = _apply(self.roots, self._offsets(state))
         J = _apply_rows(self.roots, vertex_jacobians(state, self.skin, self.vertex))
         return Linearization(r.ravel(), J.reshape(r.size, -1), np.repeat(self.weights, 3))

@@ -1,1 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
+"""Minimisers of the summed terms."""
