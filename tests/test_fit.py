@@ -7,6 +7,7 @@ import av
 import numpy as np
 import pytest
 
+from kintrack.config import StartConfig
 from kintrack.errors import ResultError
 from kintrack.fit import Outputs, caption, fit_sequence, load_person, posed_skin
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, camera_pose

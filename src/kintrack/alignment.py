@@ -137,10 +137,9 @@ def fit_pose(
             vertices_world,
             config.surface,
         )
+        terms = [surface, *([outside] if len(beside.vertex) else []), *priors]
         before = state.joint_positions_world
-        solution = solve(
-            human.body, state, [surface, outside, *priors], config.solver.steps, damping
-        )
+        solution = solve(human.body, state, terms, config.solver.steps, damping)
         state, damping = solution.state, solution.damping
         iterations += solution.steps
         clock("solve")

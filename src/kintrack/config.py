@@ -148,7 +148,7 @@ class MotionConfig:
 class SolverConfig:
     """Damped Gauss-Newton."""
 
-    rounds: int = 6
+    rounds: int = 5
     """Associations per frame at most."""
     steps: int = 1
     """Accepted steps per association at most."""

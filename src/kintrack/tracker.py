@@ -14,6 +14,7 @@ from threadpoolctl import ThreadpoolController
 
 from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.association.observation import Observation, observe, within
+from kintrack.association.window import associate
 from kintrack.body import joint_jacobians, run_kinematics
 from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
@@ -160,10 +161,12 @@ class Tracker:
         state = run_kinematics(self.human.body, predicted)
         T_camera_world = invert_rigid(self.T_world_camera)
         view = view_skin(self.human, state, T_camera_world, observation, self.config)
-        supported = agreement(view, observation, self.config.judge.explained_m).vertex_supported
+        near_m = self.config.judge.explained_m
+        found = associate(observation, view.vertices_camera, view.visible, near_m, near_m, 0)
         body, owner = self.human.body, self.human.skin.links[:, 0]
-        seen = np.bincount(owner, supported, minlength=len(body.link_names)) @ body.support
-        moved = np.bincount(owner, minlength=len(body.link_names)) @ body.support
+        n = len(body.link_names)
+        seen = np.bincount(owner[found.vertex], minlength=n) @ body.support
+        moved = np.bincount(owner, minlength=n) @ body.support
         return np.flatnonzero(seen < UNSEEN_SHARE * moved)
 
     def _pose_prior(self, unseen: Int[ndarray, " n"], dt_s: float) -> TangentPrior:

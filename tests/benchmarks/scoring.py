@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
+from timing import Timing, timing
 
 from kintrack.fit import load_person, posed_skin
 from kintrack.metrics import (
@@ -61,6 +62,9 @@ class RecordingScore:
     volume_m3: Float[ndarray, " n"]
     """Signed volume of the posed skin [m^3], above 0 unless inside out, shape (N,)."""
 
+    timing: Timing
+    """Agreement at every shift of the reference against the images."""
+
     @property
     def action(self) -> int:
         """Number of the action."""
@@ -106,6 +110,7 @@ def score_recording(result: Path, recording: Path) -> RecordingScore:
         swapped=swapped_limbs(JOINTS, estimate, reference),
         away=facing_away(track.q, T_world_camera),
         reference_away=np.einsum("ni,ni->n", Rs_camera_torso[..., 0], reference[:, 0]) > 0,
+        timing=timing(recording, JOINTS, estimate, reference),
         volume_m3=np.array(
             [
                 np.nan if skin is None else signed_volume_m3(skin, human.skin.faces)

@@ -73,7 +73,7 @@ def associate(
     n = len(vertex)
     if pixel_pairs and len(index):
         seen = sample_region(observation, pixel_pairs)
-        tree = cKDTree(vertices_camera[index])
+        tree = cKDTree(vertices_camera[index], balanced_tree=False, compact_nodes=False)
         distance, nearest = map(np.asarray, tree.query(seen, distance_upper_bound=pixel_gate_m))
         near = np.isfinite(distance)
         vertex = np.concatenate([vertex, index[nearest[near]]])
