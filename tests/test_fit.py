@@ -196,6 +196,5 @@ def test_an_unknown_pose_has_no_skin(human):
 
 
 def test_captions_say_what_matters(fitted):
-    frame, result = fitted[2][3]
-    assert caption(frame, result).startswith("frame 3")
-    assert " ms" in caption(frame, result) and " mm" in caption(frame, result)
+    _, result = fitted[2][3]
+    assert " ms" in caption(result) and " mm" in caption(result)

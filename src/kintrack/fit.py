@@ -97,7 +97,7 @@ def fit_sequence(
             writer.note(person={"shape": tracker.human.shape})
             vertices = posed_skin(tracker.human, result.q, T_world_camera)
             joints = result.joint_positions_camera_m
-            text = caption(frame, result)
+            text = caption(result)
             viewer.show(frame, vertices, joints, result.status, text)
             if page is not None:
                 page.add(frame, vertices, joints, result.status, text)
@@ -112,7 +112,7 @@ def fit_sequence(
                         skin.labels,
                         joints,
                         result.status,
-                        text,
+                        f"frame {frame.index}  {text}",
                         shades,
                     )
                 )
@@ -130,11 +130,11 @@ def posed_skin(
     return transform_points(invert_rigid(T_world_camera), vertices)
 
 
-def caption(frame: Frame, result: FrameResult) -> str:
-    """One line about a frame for pictures: number, speed, residual, or why it was skipped."""
+def caption(result: FrameResult) -> str:
+    """One line about a frame for pictures: speed and residual, or why it was skipped."""
     if result.reason is not None:
-        return f"frame {frame.index}  {result.reason}"
-    text = f"frame {frame.index}  {result.milliseconds:.0f} ms"
+        return result.reason
+    text = f"{result.milliseconds:.0f} ms"
     if np.isfinite(result.residual_rms_m):
         text += f"  residual {1e3 * result.residual_rms_m:.0f} mm"
     return text

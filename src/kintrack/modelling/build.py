@@ -76,6 +76,9 @@ def build_model(folder: Path, config: ModelBuildConfig, progress=print) -> None:
     weights = smooth_weights(np.einsum("tc,tcl->tl", bary, source.weights[corners]), faces, 2)
     basis = np.einsum("tc,ktcd->ktd", bary, source.vertices_basis[:, corners])
     _save_skin(skin / "tracking.npz", vertices, faces, weights, basis)
+    points, points_basis = dict(source.points), dict(source.points_basis)
+    centre = _head_centre(vertices, faces, weights)
+    points["head_center"], points_basis["head_center"] = centre @ vertices, centre @ basis
     _save_skin(
         skin / "display.npz", source.vertices, source.faces, source.weights, source.vertices_basis
     )
@@ -83,12 +86,21 @@ def build_model(folder: Path, config: ModelBuildConfig, progress=print) -> None:
     bodies = segment_bodies(vertices, faces, weights, Ts_root_link)
     visuals = _save_visuals(skin / "visual", source, Ts_root_link)
     extra = {
-        name: _in_link(_extra_parent(name), source.points[name], Ts_root_link)
-        for name in EXTRA_POINTS
+        name: _in_link(_extra_parent(name), points[name], Ts_root_link)
+        for name in ("head_center", *EXTRA_POINTS)
     }
-    _save_rig(skin / "rig.npz", source, Ts_root_link, extra)
+    _save_rig(skin / "rig.npz", source, points_basis, Ts_root_link, extra)
     (folder / "human.urdf").write_text(human_urdf(Ts_root_link, extra, bodies, visuals))
     progress(f"{len(vertices)} + {len(source.vertices)} vertices in {folder}")
+
+
+def _head_centre(vertices: ndarray, faces: ndarray, weights: ndarray) -> ndarray:
+    """Weights (V,) of the vertices in the area centroid of the head's closed surface."""
+    head = weights[:, [link.name for link in links()].index("head")] > 0.5
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6
+    per_vertex = np.bincount(faces.ravel(), np.repeat(area, 3), minlength=len(vertices)) * head
+    return per_vertex / per_vertex.sum()
 
 
 def _extra_parent(name: str) -> str:
@@ -132,16 +144,16 @@ def _save_skin(path: Path, vertices, faces, weights, basis) -> None:
     )
 
 
-def _save_rig(path: Path, source: SourceBody, Ts_root_link, extra) -> None:
+def _save_rig(path: Path, source: SourceBody, points_basis, Ts_root_link, extra) -> None:
     names = [link.name for link in links()]
     np.savez_compressed(
         path,
         link_names=np.array(names),
         link_labels=np.array([link.label for link in links()], dtype=np.uint8),
         Ts_root_link_bind=np.stack([Ts_root_link[name] for name in names]),
-        origins_basis_m=np.stack([source.points_basis[name] for name in names], axis=1),
+        origins_basis_m=np.stack([points_basis[name] for name in names], axis=1),
         extra_names=np.array(list(extra)),
-        extra_basis_m=np.stack([source.points_basis[name] for name in extra], axis=1),
+        extra_basis_m=np.stack([points_basis[name] for name in extra], axis=1),
         explained_variance=source.explained,
     )
 

@@ -15,8 +15,8 @@ from kintrack.modelling.skeleton import Link, links
 R_ROOT_SOURCE = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """The source body looks along -y with its left at +x; ours looks along +x with its left at +y."""
 
-EXTRA_POINTS = ("head_center", "l_hand_center", "r_hand_center", "l_toe_base", "r_toe_base")
-"""Reported places that are no link's origin."""
+EXTRA_POINTS = ("l_hand_center", "r_hand_center", "l_toe_base", "r_toe_base")
+"""Reported places that are no link's origin; `head_center` is added from the closed skin."""
 
 
 @dataclass(frozen=True)
@@ -122,9 +122,6 @@ def _summarise(vertices, heads, bones, faces, bone_weights, components) -> Sourc
     weights = bone_weights @ bone_link_matrix(bones, tree)
     weights /= weights.sum(axis=1, keepdims=True)
     points = _points(heads, bones, tree)
-    skull = weights[:, [link.name for link in tree].index("head")] > 0.99
-    area = np.where(skull, _vertex_areas(vertices.mean(axis=0), faces), 0)
-    points["head_center"] = np.tensordot(vertices, area / area.sum(), (1, 0))
     origin = points["pelvis"].copy()
     vertices = vertices - origin[:, None]
     points = {name: p - origin for name, p in points.items()}
@@ -157,13 +154,6 @@ def _summarise(vertices, heads, bones, faces, bone_weights, components) -> Sourc
         explained=(s**2 / (s**2).sum())[:components],
         landmarks={name: p.mean(axis=0) for name, p in landmarks.items()},
     )
-
-
-def _vertex_areas(vertices, faces) -> Float[ndarray, " v"]:
-    """A third of the area of each vertex's triangles [m^2]."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6
-    return np.bincount(faces.ravel(), np.repeat(area, 3), minlength=len(vertices))
 
 
 def _points(heads, bones, tree) -> dict[str, Float[ndarray, "n 3"]]:
