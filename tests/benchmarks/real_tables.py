@@ -170,11 +170,15 @@ def _timing(scores: Sequence[RecordingScore]) -> str:
         "figures above are taken at 0, as the recordings are given."
     )
     rows = [
-        [f"{lead}", *(f"{100 * x[i]:.1f}" for x in (to_points, distance, offset_free))]
+        [
+            f"{lead}",
+            *(f"{100 * x[i]:.1f}" for x in (to_points, distance, offset_free)),
+            f"{sum(int(s.timing.swapped[i]) for s in scores)}",
+        ]
         for i, lead in enumerate(LEADS)
     ]
     header = ["reference ahead by frames", "its distance to points cm", "distance cm"]
-    return says + "\n\n" + table([*header, "offset-free cm"], rows)
+    return says + "\n\n" + table([*header, "offset-free cm", "swapped frames"], rows)
 
 
 def _where(

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray
 from scipy.spatial import cKDTree
 
-from kintrack.metrics import joint_distances, offset_free_distances
+from kintrack.metrics import joint_distances, offset_free_distances, swapped_limbs
 from kintrack.sequence import open_sequence
 
 LEADS = np.arange(-1, 5)
@@ -36,6 +36,8 @@ class Timing(NamedTuple):
     """Mean distance between estimate and shifted reference [m]."""
     offset_free_m: Float[ndarray, " s"]
     """The same without each joint's constant offset [m]."""
+    swapped: Int[ndarray, " s"]
+    """Frames with at least one limb's left and right exchanged."""
 
 
 def timing(
@@ -78,4 +80,7 @@ def timing(
         fast=fast,
         distance_m=np.array([np.nanmean(joint_distances(*pair)) for pair in pairs]),
         offset_free_m=np.array([np.nanmean(offset_free_distances(*pair)) for pair in pairs]),
+        swapped=np.array(
+            [np.any(list(swapped_limbs(joints, *pair).values()), axis=0).sum() for pair in pairs]
+        ),
     )

@@ -100,11 +100,11 @@ def _search(v, points, region, fx, fy, cx, cy, gate):
         step = (half + MAX_HALF_WINDOW - 1) // MAX_HALF_WINDOW
         half = half // step * step
         best = gate * gate
-        for a in range(r - half, r + half + 1, step):
-            if a < 0 or a >= h:
-                continue
-            for b in range(u - half, u + half + 1, step):
-                if b < 0 or b >= w or not region[a, b]:
+        above = max(0, -((r - half) // step)) * step if r < half else 0
+        left = max(0, -((u - half) // step)) * step if u < half else 0
+        for a in range(r - half + above, min(h, r + half + 1), step):
+            for b in range(u - half + left, min(w, u + half + 1), step):
+                if not region[a, b]:
                     continue
                 dx = points[a, b, 0] - x
                 dy = points[a, b, 1] - y

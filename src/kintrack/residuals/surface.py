@@ -167,8 +167,18 @@ def silhouette_residual(
 
 def _roots(n: Float[ndarray, "n 3"], alpha: float) -> Float[ndarray, "n 3 3"]:
     """A_i of the module's equation."""
-    gain = np.sqrt(1 + alpha) - np.sqrt(alpha)
-    return gain * n[:, :, None] * n[:, None, :] + np.sqrt(alpha) * np.eye(3)
+    return _fill_roots(n, np.sqrt(alpha), np.sqrt(1 + alpha) - np.sqrt(alpha))
+
+
+@njit(cache=True)
+def _fill_roots(n, base, gain):
+    out = np.empty((n.shape[0], 3, 3))
+    for i in range(n.shape[0]):
+        for r in range(3):
+            for c in range(3):
+                out[i, r, c] = gain * n[i, r] * n[i, c]
+            out[i, r, r] += base
+    return out
 
 
 @njit(cache=True)
