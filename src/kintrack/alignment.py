@@ -70,6 +70,7 @@ def fit_pose(
     config: TrackerConfig,
     gates_m: Sequence[float],
     clock: Callable[[str], None] = lambda stage: None,
+    view: View | None = None,
 ) -> Fit:
     """Fit a pose: one association per gate, a few Gauss-Newton steps each.
 
@@ -82,6 +83,7 @@ def fit_pose(
         config: All weights.
         gates_m: Largest pair distance of each round [m].
         clock: Called after each stage with its name.
+        view: The skin at q, if the caller has it.
 
     Returns:
         The fit; once no joint moves, only the last gate is still tried.
@@ -101,7 +103,8 @@ def fit_pose(
     remaining = list(gates_m)
     while remaining:
         gate_m = remaining.pop(0)
-        view = view_skin(human, state, T_camera_world, observation, config)
+        if view is None:
+            view = view_skin(human, state, T_camera_world, observation, config)
         clock("skin")
         pairs = associate(
             observation,
@@ -137,9 +140,11 @@ def fit_pose(
             vertices_world,
             config.surface,
         )
-        terms = [surface, *([outside] if len(beside.vertex) else []), *priors]
+        view = None
         before = state.joint_positions_world
-        solution = solve(human.body, state, terms, config.solver.steps, damping)
+        solution = solve(
+            human.body, state, [surface.joined(outside), *priors], config.solver.steps, damping
+        )
         state, damping = solution.state, solution.damping
         iterations += solution.steps
         clock("solve")

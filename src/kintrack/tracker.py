@@ -12,10 +12,10 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 from threadpoolctl import ThreadpoolController
 
-from kintrack.alignment import Fit, fit_pose, view_skin
+from kintrack.alignment import Fit, View, fit_pose, view_skin
 from kintrack.association.observation import Observation, observe, within
 from kintrack.association.window import associate
-from kintrack.body import joint_jacobians, run_kinematics
+from kintrack.body import BodyState, joint_jacobians, run_kinematics
 from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
@@ -25,7 +25,6 @@ from kintrack.judge import acceptable, agreement, joint_visibility
 from kintrack.residuals.prior import TangentPrior, diagonal_prior, gaussian_prior
 from kintrack.result import FrameResult
 from kintrack.sequence.frame import Frame
-from kintrack.skin import skinned_vertices
 from kintrack.solver.gauss_newton import normal_equations
 from kintrack.start import sized, start
 
@@ -104,9 +103,10 @@ class Tracker:
         if self.belief is None:
             return self._start(frame, observation, began)
         predicted, covariance = self._predict(self.belief, frame.timestamp_s)
-        observation = within(observation, self._box(predicted))
+        expected = self._view(run_kinematics(self.human.body, predicted), observation)
+        observation = within(observation, self._box(expected))
         self._clock("observe")
-        unseen = self._unseen(predicted, observation)
+        unseen = self._unseen(expected, observation)
         dt_s = max(frame.timestamp_s - self.belief.timestamp_s, 1e-3)
         priors = [gaussian_prior(predicted, covariance), self._pose_prior(unseen, dt_s)]
         gates = np.geomspace(a.first_gate_m, a.last_gate_m, config.solver.rounds).tolist()
@@ -120,6 +120,7 @@ class Tracker:
                 config,
                 gates,
                 self._clock,
+                expected,
             )
         except AssociationError:
             return self._miss(frame, began)
@@ -154,15 +155,12 @@ class Tracker:
         q[7:] = np.clip(q[7:], body.lower[6:], body.upper[6:])
         return q, belief.covariance + np.diag(motion_sigma(body, motion, dt) ** 2)
 
-    def _unseen(
-        self, predicted: Float[ndarray, " nq"], observation: Observation
-    ) -> Int[ndarray, " n"]:
+    def _unseen(self, expected: View, observation: Observation) -> Int[ndarray, " n"]:
         """Hinges of which hardly any skin that they move is observed where it is expected."""
-        state = run_kinematics(self.human.body, predicted)
-        T_camera_world = invert_rigid(self.T_world_camera)
-        view = view_skin(self.human, state, T_camera_world, observation, self.config)
         near_m = self.config.judge.explained_m
-        found = associate(observation, view.vertices_camera, view.visible, near_m, near_m, 0)
+        found = associate(
+            observation, expected.vertices_camera, expected.visible, near_m, near_m, 0
+        )
         body, owner = self.human.body, self.human.skin.links[:, 0]
         n = len(body.link_names)
         seen = np.bincount(owner[found.vertex], minlength=n) @ body.support
@@ -175,14 +173,15 @@ class Tracker:
         sigma[unseen] *= np.sqrt(max(self.config.prior.unseen_s / dt_s, 1.0))
         return diagonal_prior(self._resting, sigma)
 
-    def _box(self, q: Float[ndarray, " nq"]) -> Float[ndarray, "2 3"]:
-        """Camera-frame box around the predicted skin, grown by the region's margin [m]."""
-        state = run_kinematics(self.human.body, q)
-        vertices = transform_points(
-            invert_rigid(self.T_world_camera), skinned_vertices(state, self.human.skin)
-        )
-        margin = self.config.association.region_margin_m
-        return np.stack([vertices.min(axis=0) - margin, vertices.max(axis=0) + margin])
+    def _view(self, state: BodyState, observation: Observation) -> View:
+        """The skin of a state as the camera sees it."""
+        T_camera_world = invert_rigid(self.T_world_camera)
+        return view_skin(self.human, state, T_camera_world, observation, self.config)
+
+    def _box(self, expected: View) -> Float[ndarray, "2 3"]:
+        """Camera-frame box around the expected skin, grown by the region's margin [m]."""
+        v, margin = expected.vertices_camera, self.config.association.region_margin_m
+        return np.stack([v.min(axis=0) - margin, v.max(axis=0) + margin])
 
     def _report(
         self,
@@ -196,7 +195,7 @@ class Tracker:
         """Judge the fit, update the belief, and say how sure every joint is."""
         config, body = self.config, self.human.body
         T_camera_world = invert_rigid(self.T_world_camera)
-        view = view_skin(self.human, fit.state, T_camera_world, observation, config)
+        view = self._view(fit.state, observation)
         agreed = agreement(view, observation, config.judge.explained_m)
         good = acceptable(agreed, fit.surface.rms_m, config.judge)
         H, _, _ = normal_equations(fit.state, [fit.surface, *priors])

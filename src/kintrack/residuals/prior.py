@@ -32,7 +32,7 @@ class TangentPrior:
         return self.root.T @ pin.difference(state.body.model, self.q0, state.q)
 
     def linearize(self, state: BodyState) -> Linearization:
-        """R = L^T difference(q0, q), with the exact derivative of the difference."""
+        """Rows L^T difference(q0, q), with the exact derivative of the difference."""
         model = state.body.model
         dq = pin.dDifference(model, self.q0, state.q, pin.ArgumentPosition.ARG1)
         r = self._residual(state)

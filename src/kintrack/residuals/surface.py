@@ -8,7 +8,7 @@ root A_i = sqrt(alpha) I + (sqrt(1 + alpha) - sqrt(alpha)) n_i n_i^T, so r_i = A
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -47,8 +47,18 @@ class SurfaceResidual:
     def _offsets(self, state: BodyState) -> Float[ndarray, "n 3"]:
         return skinned_vertices(state, self.skin)[self.vertex] - self.points_world
 
+    def joined(self, other: SurfaceResidual) -> SurfaceResidual:
+        """The pairs of both terms as one, with this one's scale, inliers and RMS."""
+        return replace(
+            self,
+            vertex=np.concatenate([self.vertex, other.vertex]),
+            points_world=np.concatenate([self.points_world, other.points_world]),
+            roots=np.concatenate([self.roots, other.roots]),
+            weights=np.concatenate([self.weights, other.weights]),
+        )
+
     def linearize(self, state: BodyState) -> Linearization:
-        """R = A_i d_i, rows of one pair together, shape (3 N,) [m]."""
+        """Rows A_i d_i, the three of one pair together, shape (3 N,) [m]."""
         r = _apply(self.roots, self._offsets(state))
         J = _apply_rows(self.roots, vertex_jacobians(state, self.skin, self.vertex))
         return Linearization(r.ravel(), J.reshape(r.size, -1), np.repeat(self.weights, 3))
