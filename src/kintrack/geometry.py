@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from numba import njit
 from numpy import ndarray
 
 from kintrack.errors import ConfigError
@@ -81,12 +82,7 @@ class PinholeCamera:
         Returns:
             Points in the camera frame [m], shape (height, width, 3).
         """
-        z = np.where(np.isfinite(depth_m) & (depth_m > 0), depth_m, 0.0)
-        points = np.empty((*z.shape, 3))
-        points[..., 2] = z
-        np.multiply((np.arange(self.width) - self.cx) / self.fx, z, out=points[..., 0])
-        np.multiply(((np.arange(self.height) - self.cy) / self.fy)[:, None], z, out=points[..., 1])
-        return points
+        return _back_project(depth_m, self.fx, self.fy, self.cx, self.cy)
 
     def scaled(self, factor: int) -> PinholeCamera:
         """The camera whose pixel (i, j) is this one's pixel (i * factor, j * factor)."""
@@ -98,6 +94,20 @@ class PinholeCamera:
             cx=self.cx / factor,
             cy=self.cy / factor,
         )
+
+
+@njit(cache=True)
+def _back_project(depth, fx, fy, cx, cy):
+    h, w = depth.shape
+    out = np.zeros((h, w, 3))
+    for v in range(h):
+        for u in range(w):
+            z = np.float64(depth[v, u])
+            if z > 0.0 and z < np.inf:
+                out[v, u, 0] = (u - cx) / fx * z
+                out[v, u, 1] = (v - cy) / fy * z
+                out[v, u, 2] = z
+    return out
 
 
 def camera_pose(pitch_deg: float) -> Float[ndarray, "4 4"]:
