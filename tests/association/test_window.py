@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+import multiprocessing
+
 import numpy as np
 import pytest
 
@@ -129,3 +131,12 @@ def test_association_repeats_to_the_bit(human, scene):
     for again in others:
         assert first.vertex.tobytes() == again.vertex.tobytes()
         assert first.points_camera.tobytes() == again.points_camera.tobytes()
+
+
+def test_a_forked_process_searches_too(cloud, vertices):
+    visible = np.ones(len(vertices), dtype=bool)
+    here = associate(cloud, vertices, visible, 0.05, 0.1, 100)
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        there = pool.apply_async(associate, (cloud, vertices, visible, 0.05, 0.1, 100)).get(30)
+    assert np.array_equal(here.vertex, there.vertex)
+    assert np.array_equal(here.points_camera, there.points_camera)

@@ -8,6 +8,9 @@ takes the nearest visible vertex, so that an arm which the model does not cover 
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -57,7 +60,8 @@ def associate(
     """
     index = np.flatnonzero(visible)
     camera = observation.camera
-    pixel = _search(
+    searched = _second_core().submit(
+        _search,
         vertices_camera[index],
         observation.points_camera,
         observation.region,
@@ -67,18 +71,31 @@ def associate(
         camera.cy,
         gate_m,
     )
-    found = pixel >= 0
-    flat = observation.points_camera.reshape(-1, 3)
-    vertex, points = index[found], flat[pixel[found]]
-    n = len(vertex)
-    if pixel_pairs and len(index):
-        seen = sample_region(observation, pixel_pairs)
+    seen = sample_region(observation, pixel_pairs) if pixel_pairs else np.zeros((0, 3))
+    if len(seen) and len(index):
         tree = cKDTree(vertices_camera[index], balanced_tree=False, compact_nodes=False)
         distance, nearest = map(np.asarray, tree.query(seen, distance_upper_bound=pixel_gate_m))
         near = np.isfinite(distance)
-        vertex = np.concatenate([vertex, index[nearest[near]]])
-        points = np.concatenate([points, seen[near]])
-    return Pairs(vertex, points, n)
+        seen, taken = seen[near], index[nearest[near]]
+    else:
+        seen, taken = seen[:0], index[:0]
+    pixel = searched.result()
+    found = pixel >= 0
+    flat = observation.points_camera.reshape(-1, 3)
+    return Pairs(
+        np.concatenate([index[found], taken]),
+        np.concatenate([flat[pixel[found]], seen]),
+        int(found.sum()),
+    )
+
+
+@cache
+def _second_core() -> ThreadPoolExecutor:
+    """One thread for the window search, which runs beside the tree search."""
+    return ThreadPoolExecutor(max_workers=1, thread_name_prefix="kintrack-window")
+
+
+os.register_at_fork(after_in_child=_second_core.cache_clear)
 
 
 def sample_region(observation: Observation, count: int) -> Float[ndarray, "n 3"]:
@@ -88,7 +105,7 @@ def sample_region(observation: Observation, count: int) -> Float[ndarray, "n 3"]
     return observation.points_camera[::step, ::step][thin]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _search(v, points, region, fx, fy, cx, cy, gate):
     h, w = region.shape
     out = np.full(v.shape[0], -1, dtype=np.int64)
