@@ -29,6 +29,7 @@ ROWS = (
     ("export",),
     ("viewer",),
     ("fit",),
+    ("strip",),
     ("modelling",),
     ("cli",),
 )

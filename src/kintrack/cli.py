@@ -25,6 +25,7 @@ from kintrack.modelling.build import ModelBuildConfig, build_model
 from kintrack.modelling.pictures import draw_model
 from kintrack.result import TRACK_FILE, Track
 from kintrack.sequence import SequenceReader, open_sequence
+from kintrack.strip import write_strip
 from kintrack.viewer import MeshcatViewer, NullViewer, Viewer, replay
 
 console = Console()
@@ -174,6 +175,7 @@ class Demo:
             sequence=recording, output=self.output, video=self.output / "overlay.mp4", html=page
         ).run()
         Evaluate(self.output, recording, truth=True).run()
+        write_strip(self.output, open_sequence(recording), self.output / "overlay.png")
         if not self.no_open:
             webbrowser.open(page.resolve().as_uri())
 
