@@ -215,3 +215,11 @@ def test_stages_are_reported_for_benchmarks(again, stages):
     assert stages.count("observe") == stages.count("report") - 1 == len(again) - 1
     assert stages[-1] == "report"
     assert {"skin", "associate", "solve"} <= set(stages)
+
+
+def test_a_rejected_start_leaves_the_body_as_it_was(scene):
+    depth = np.zeros((scene.camera.height, scene.camera.width), dtype=np.float32)
+    depth[60:200, 110:210] = 2.5  # a board, as tall as a person but no person
+    tracker = Tracker()
+    assert tracker.step(scene.frame(depth)).status == "initialising"
+    assert len(tracker.human.shape) == 0

@@ -181,6 +181,9 @@ def sized(
 
     Returns:
         The sized human and the start refitted with it.
+
+    Raises:
+        AssociationError: if no observed point lies near the skin of some size.
     """
     T_camera_world = invert_rigid(T_world_camera)
     gates = [config.association.last_gate_m] * 4
@@ -206,7 +209,8 @@ def sized(
         shape[k] = values[i]
         if 0 < i < len(values) - 1:
             a, b, c = errors[i - 1 : i + 2]
-            shape[k] += 0.5 * (a - c) / (a - 2 * b + c) * (values[1] - values[0])
+            bend = a - 2 * b + c
+            shape[k] += 0.5 * (a - c) / bend * (values[1] - values[0]) if bend > 0 else 0.0
     _, person, fit = refit(shape)
     view = view_skin(person, fit.state, T_camera_world, seen, config)
     return person, Start(fit, agreement(view, seen, config.judge.explained_m), seen)

@@ -128,22 +128,21 @@ class Tracker:
 
     def _start(self, frame: Frame, observation: Observation, began: float) -> FrameResult:
         """First frame, or the first after a loss: find the person and fit from several guesses."""
-        found = start(self.human, observation, self.T_world_camera, self.config)
-        if (
-            found is not None
-            and len(self.human.shape) == 0
-            and self.config.start.shape_coefficients
-        ):
-            person, found = sized(self.human, found, self.T_world_camera, self.config)
-            self._meet(person)
+        config, person = self.config, self.human
+        found = start(person, observation, self.T_world_camera, config)
+        if found is not None and len(person.shape) == 0 and config.start.shape_coefficients:
+            try:
+                person, found = sized(person, found, self.T_world_camera, config)
+            except AssociationError:
+                found = None
         self._clock("start")
-        judge = self.config.judge
         if (
             found is None
-            or found.agreed.explained < judge.start_explained
-            or not acceptable(found.agreed, found.fit.surface.rms_m, judge)
+            or found.agreed.explained < config.judge.start_explained
+            or not acceptable(found.agreed, found.fit.surface.rms_m, config.judge)
         ):
             return self._nothing(frame, "initialising", began)
+        self._meet(person)
         priors = [diagonal_prior(self._resting, self._prior_sigma)]
         return self._report(frame, found.observation, found.fit, priors, NONE, began)
 
