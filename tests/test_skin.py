@@ -7,7 +7,6 @@ from kintrack.body import run_kinematics
 from kintrack.errors import ModelError
 from kintrack.human import posed
 from kintrack.skin import (
-    directional_jacobians,
     load_skin,
     skinned_vertices,
     vertex_jacobians,
@@ -119,18 +118,6 @@ def test_vertex_jacobians_agree_with_differences(human, body, legal_pose, differ
     numeric = differences(lambda state: skinned_vertices(state, human.skin)[SOME], q)
     assert np.allclose(
         vertex_jacobians(run_kinematics(body, q), human.skin, SOME), numeric, atol=1e-7
-    )
-
-
-@pytest.mark.parametrize("seed", POSES)
-def test_directional_jacobians_agree_with_differences(human, body, legal_pose, differences, seed):
-    q = legal_pose(seed)
-    d = np.random.default_rng(seed).normal(size=(len(SOME), 3))
-    numeric = differences(
-        lambda state: np.einsum("ni,ni->n", d, skinned_vertices(state, human.skin)[SOME]), q
-    )
-    assert np.allclose(
-        directional_jacobians(run_kinematics(body, q), human.skin, SOME, d), numeric, atol=1e-7
     )
 
 

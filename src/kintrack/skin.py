@@ -113,28 +113,6 @@ def vertex_jacobians(
     return _jacobians(state.Ts_world_link, state.J_world, state.body.support, *_rows(skin, vertex))
 
 
-def directional_jacobians(
-    state: BodyState,
-    skin: Skin,
-    vertex: Int[ndarray, " n"],
-    directions: Float[ndarray, "n 3"],
-) -> Float[ndarray, "n nv"]:
-    """d_i^T ds_i/dv for one direction a vertex, without forming the full Jacobians.
-
-    Args:
-        state: Body with kinematics computed.
-        skin: Its skin.
-        vertex: Vertex indices, shape (N,).
-        directions: World directions, shape (N, 3).
-
-    Returns:
-        Rows (N, nv) [m per m or rad].
-    """
-    return _directional(
-        state.Ts_world_link, state.J_world, state.body.support, directions, *_rows(skin, vertex)
-    )
-
-
 def _rows(skin: Skin, vertex: ndarray) -> tuple[ndarray, ndarray, ndarray]:
     return skin.links[vertex], skin.weights[vertex], skin.points_link[vertex]
 
@@ -198,33 +176,4 @@ def _jacobians(Ts, J, support, links, weights, points):
                     out[i, 0, k] += w * (J[0, k] + J[4, k] * z - J[5, k] * y)
                     out[i, 1, k] += w * (J[1, k] + J[5, k] * x - J[3, k] * z)
                     out[i, 2, k] += w * (J[2, k] + J[3, k] * y - J[4, k] * x)
-    return out
-
-
-@njit(cache=True)
-def _directional(Ts, J, support, directions, links, weights, points):
-    n, nv = links.shape[0], J.shape[1]
-    out = np.zeros((n, nv))
-    for i in range(n):
-        dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
-        for b in range(4):
-            w = weights[i, b]
-            if w == 0.0:
-                continue
-            T = Ts[links[i, b]]
-            p = points[i, b]
-            x = T[0, 0] * p[0] + T[0, 1] * p[1] + T[0, 2] * p[2] + T[0, 3]
-            y = T[1, 0] * p[0] + T[1, 1] * p[1] + T[1, 2] * p[2] + T[1, 3]
-            z = T[2, 0] * p[0] + T[2, 1] * p[1] + T[2, 2] * p[2] + T[2, 3]
-            mx = w * (y * dz - z * dy)
-            my = w * (z * dx - x * dz)
-            mz = w * (x * dy - y * dx)
-            for k in range(nv):
-                if support[links[i, b], k]:
-                    out[i, k] += (
-                        w * (J[0, k] * dx + J[1, k] * dy + J[2, k] * dz)
-                        + J[3, k] * mx
-                        + J[4, k] * my
-                        + J[5, k] * mz
-                    )
     return out
