@@ -213,6 +213,22 @@ def load_body(folder: Path | None = None, shape: Float[ndarray, " k"] | None = N
         ModelError: if the file is missing, is no URDF, or lacks a frame that kintrack needs.
     """
     folder = model_folder() if folder is None else Path(folder)
+    return rigged_body(folder, load_rig(folder, shape))
+
+
+def rigged_body(folder: Path, rig: Rig) -> Body:
+    """Read the human's URDF and move its joints to where a rig has them.
+
+    Args:
+        folder: Folder with `human.urdf` and `skin/`.
+        rig: Bind frames of a person, turned as those of the model are.
+
+    Returns:
+        The body.
+
+    Raises:
+        ModelError: as `load_body`.
+    """
     urdf = folder / "human.urdf"
     if not urdf.is_file():
         raise ModelError(f"{urdf}: no such file; a URDF of the human is needed")
@@ -220,14 +236,12 @@ def load_body(folder: Path | None = None, shape: Float[ndarray, " k"] | None = N
         model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
     except (ValueError, RuntimeError) as error:
         raise ModelError(f"{urdf}: not a readable URDF ({error})") from error
-    rig = load_rig(folder, shape)
     names = rig.link_names
     needed = set(FRAME_OF_JOINT.values()) | set(names)
     missing = sorted(name for name in needed if not model.existFrame(name))
     if missing:
         raise ModelError(f"{urdf}: lacks the frames {', '.join(missing)}, which kintrack needs")
-    if shape is not None:
-        _move_origins(model, rig, load_rig(folder))
+    _move_origins(model, rig, load_rig(folder))
     joints = np.array([model.frames[model.getFrameId(n)].parentJoint for n in names])
     lower = np.full(model.nv, -np.inf)
     upper = np.full(model.nv, np.inf)

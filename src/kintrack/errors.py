@@ -28,3 +28,11 @@ class AssociationError(KintrackError):
 
 class ResultError(KintrackError):
     """A result or reference cannot be written or read."""
+
+
+class SceneError(KintrackError):
+    """An object, a person or a room cannot be rendered as asked."""
+
+
+class DatasetError(KintrackError):
+    """A dataset cannot be built, or what is there does not fit the recipe."""

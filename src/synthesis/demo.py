@@ -20,11 +20,11 @@ from kintrack.body import run_kinematics
 from kintrack.geometry import PinholeCamera, invert_rigid, transform_points
 from kintrack.sequence.write import SequenceWriter
 from kintrack.skin import skinned_vertices
-from synthesis.camera import level_camera, look
-from synthesis.motion import RATE_HZ, Motion, perform
-from synthesis.person import Person, dressed, load_person
-from synthesis.scripts import demo
-from synthesis.sensors import Sensor, kinect_v1
+from synthesis.motions.motion import RATE_HZ, Motion, perform
+from synthesis.motions.scripts import demo
+from synthesis.people.person import Person, dressed, load_person
+from synthesis.render.camera import level_camera, look
+from synthesis.sensors.models import Sensor, kinect_v1
 
 KINECT_V1 = PinholeCamera(width=320, height=240, fx=285.6, fy=285.6, cx=160.0, cy=120.0)
 SHAPE = (0.8, -0.6, 0.5, 0.3)

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from synthesis.demo import SHAPE
-from synthesis.person import Person, load_person
+from synthesis.people.person import Person, load_person
 
 
 @pytest.fixture(scope="session")

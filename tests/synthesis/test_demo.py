@@ -11,11 +11,11 @@ from kintrack.joints import JOINT_NAMES
 from kintrack.sequence import open_sequence
 from kintrack.sequence.reference import read_reference_joints
 from synthesis import demo
-from synthesis.camera import level_camera
-from synthesis.motion import perform
-from synthesis.person import dressed
-from synthesis.scripts import demo as demo_script
-from synthesis.sensors import perfect
+from synthesis.motions.motion import perform
+from synthesis.motions.scripts import demo as demo_script
+from synthesis.people.person import dressed
+from synthesis.render.camera import level_camera
+from synthesis.sensors.models import perfect
 
 SHIPPED = Path(kintrack.__file__).parent / "demo"
 TRUNK = [JOINT_NAMES.index(name) for name in ("pelvis", "spine", "chest", "neck")]

@@ -4,7 +4,7 @@ import pytest
 
 from kintrack.body import run_kinematics
 from kintrack.joints import JOINT_NAMES
-from synthesis.arms import arm
+from synthesis.motions.arms import arm
 
 CASES = [
     ((0.0, 1.0, 0.0), (0.0, 1.0, 0.2), 0.0),

@@ -6,10 +6,10 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from kintrack.body import run_kinematics
 from kintrack.geometry import PinholeCamera, invert_rigid, transform_points
 from kintrack.skin import skinned_vertices
-from synthesis.camera import SUPERSAMPLING, level_camera, look
 from synthesis.demo import KINECT_V1
-from synthesis.motion import perform
-from synthesis.scripts import arms
+from synthesis.motions.motion import perform
+from synthesis.motions.scripts import arms
+from synthesis.render.camera import SUPERSAMPLING, level_camera, look
 
 T_WORLD_CAMERA = level_camera(2.6, 1.0)
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import numpy as np
 
-from synthesis.curves import keyed, minimum_jerk
+from synthesis.motions.curves import keyed, minimum_jerk
 
 RATE_HZ = 30.0
 TIMES_S = np.arange(90) / RATE_HZ

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.body import Body
-from synthesis.person import SIDES, Person
+from synthesis.people.person import SIDES, Person
 
 LEG_HINGES = (
     "hip_flexion",

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from synthesis.arms import arm
-from synthesis.motion import Script, Step
+from synthesis.motions.arms import arm
+from synthesis.motions.motion import Script, Step
 
 Pose = Mapping[str, float]
 

@@ -37,7 +37,7 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
 
-from synthesis.camera import SUPERSAMPLING, View
+from synthesis.render.camera import SUPERSAMPLING, View
 
 BASELINE_M = 0.075
 """Kinect v1: projector to camera [m]."""

@@ -5,8 +5,8 @@ import pytest
 from kintrack.body import run_kinematics
 from kintrack.joints import JOINT_NAMES
 from kintrack.skin import skinned_vertices
-from synthesis.motion import RATE_HZ, perform
-from synthesis.scripts import MOTIONS
+from synthesis.motions.motion import RATE_HZ, perform
+from synthesis.motions.scripts import MOTIONS
 
 pytestmark = pytest.mark.parametrize("name", list(MOTIONS))
 

@@ -4,7 +4,7 @@ import numpy as np
 from kintrack.body import run_kinematics
 from kintrack.skin import skinned_vertices
 from synthesis.demo import SHAPE
-from synthesis.person import CLOTH_MAX_M, CLOTH_MIN_M, dressed
+from synthesis.people.person import CLOTH_MAX_M, CLOTH_MIN_M, dressed
 
 
 def _thickness(person):

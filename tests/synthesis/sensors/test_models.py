@@ -2,9 +2,9 @@
 import numpy as np
 import pytest
 
-from synthesis.camera import look
 from synthesis.demo import KINECT_V1
-from synthesis.sensors import (
+from synthesis.render.camera import look
+from synthesis.sensors.models import (
     EDGE_M,
     GRAZING_RAD,
     SENSORS,

@@ -18,9 +18,9 @@ from numpy import ndarray
 from scipy.ndimage import minimum_filter1d
 
 from kintrack.body import run_kinematics
-from synthesis.curves import SMOOTH_S, keyed, minimum_jerk, smooth
-from synthesis.legs import LEG_HINGES, foot_pose, solve_legs, yaw_matrix
-from synthesis.person import SIDES, Person
+from synthesis.motions.curves import SMOOTH_S, keyed, minimum_jerk, smooth
+from synthesis.motions.legs import LEG_HINGES, foot_pose, solve_legs, yaw_matrix
+from synthesis.people.person import SIDES, Person
 
 RATE_HZ = 30.0
 NARROWER_M = 0.03

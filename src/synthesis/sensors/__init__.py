@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How depth and colour cameras misread what is there."""
