@@ -213,6 +213,7 @@ def load_body(folder: Path | None = None, shape: Float[ndarray, " k"] | None = N
         ModelError: if the file is missing, is no URDF, or lacks a frame that kintrack needs.
     """
     folder = model_folder() if folder is None else Path(folder)
+    _urdf(folder)
     return rigged_body(folder, load_rig(folder, shape))
 
 
@@ -229,9 +230,7 @@ def rigged_body(folder: Path, rig: Rig) -> Body:
     Raises:
         ModelError: as `load_body`.
     """
-    urdf = folder / "human.urdf"
-    if not urdf.is_file():
-        raise ModelError(f"{urdf}: no such file; a URDF of the human is needed")
+    urdf = _urdf(folder)
     try:
         model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
     except (ValueError, RuntimeError) as error:
@@ -260,6 +259,14 @@ def rigged_body(folder: Path, rig: Rig) -> Body:
         joint_support=_support(model, [model.frames[int(f)].parentJoint for f in frames]),
         scratch=model.createData(),
     )
+
+
+def _urdf(folder: Path) -> Path:
+    """The model's URDF, which must be there."""
+    urdf = folder / "human.urdf"
+    if not urdf.is_file():
+        raise ModelError(f"{urdf}: no such file; a URDF of the human is needed")
+    return urdf
 
 
 def _support(model: pin.Model, joints) -> Bool[ndarray, "n nv"]:
