@@ -97,7 +97,7 @@ def write_demo_sequence(folder: Path, seed: int = 0) -> None:
     """
     rng = np.random.default_rng(seed)
     shape = np.array(SHAPE)
-    person = dressed(load_person(shape), shape, rng)
+    person = dressed(load_person(shape), rng)
     motion = perform(person, demo())
     writer = SequenceWriter(folder, KINECT_V1, overwrite=True)
     T_world_camera = level_camera(DISTANCE_M, HEIGHT_M)

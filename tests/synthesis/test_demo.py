@@ -24,7 +24,7 @@ TRUNK = [JOINT_NAMES.index(name) for name in ("pelvis", "spine", "chest", "neck"
 @pytest.fixture(scope="module")
 def exposures(person):
     rng = np.random.default_rng(0)
-    clothed = dressed(person, np.array(demo.SHAPE), rng)
+    clothed = dressed(person, rng)
     motion = perform(person, demo_script())
     T_world_camera = level_camera(demo.DISTANCE_M, demo.HEIGHT_M)
     return list(demo.film(clothed, motion, demo.KINECT_V1, T_world_camera, perfect, rng))[::6]

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.body import Body, load_body, load_rig, model_folder, run_kinematics
+from kintrack.body import Body, Rig, load_body, load_rig, model_folder, run_kinematics
 from kintrack.skin import Skin, load_skin, skinned_vertices, vertex_normals
 
 SIDES = ("l", "r")
@@ -32,6 +32,10 @@ class Person:
     """Kinematic tree."""
     skin: Skin
     """Display skin."""
+    rig: Rig
+    """Link frames in bind pose."""
+    bind_vertices: Float[ndarray, "v 3"]
+    """The display skin in bind pose, root frame [m]."""
     foot_points: dict[str, Float[ndarray, "n 3"]]
     """Skin of each foot in the foot's frame [m]."""
     heel: dict[str, Float[ndarray, " 3"]]
@@ -50,6 +54,9 @@ def load_person(shape: Float[ndarray, " k"] | None = None) -> Person:
         The person.
     """
     body, skin = load_body(shape=shape), load_skin("display", shape=shape)
+    rig = load_rig(model_folder(), shape)
+    T = rig.Ts_root_link[skin.links[:, 0]]
+    bind_vertices = np.einsum("vij,vj->vi", T[:, :3, :3], skin.points_link[:, 0]) + T[:, :3, 3]
     state = run_kinematics(body, body.neutral())
     vertices = skinned_vertices(state, skin)
     points, heel, toe = {}, {}, {}
@@ -61,10 +68,10 @@ def load_person(shape: Float[ndarray, " k"] | None = None) -> Person:
         sole = foot[foot[:, 2] < foot[:, 2].min() + SOLE_HEIGHT_M]
         points[side] = foot
         heel[side], toe[side] = sole[sole[:, 0].argmin()], sole[sole[:, 0].argmax()]
-    return Person(body, skin, points, heel, toe)
+    return Person(body, skin, rig, bind_vertices, points, heel, toe)
 
 
-def dressed(person: Person, shape: Float[ndarray, " k"] | None, rng: np.random.Generator) -> Person:
+def dressed(person: Person, rng: np.random.Generator) -> Person:
     """The person with clothes: the skin moved outwards by 5 to 15 mm, smoothly varying.
 
     The thickness is a sum of plane waves over the bind pose, scaled to the range, and fades to
@@ -73,16 +80,14 @@ def dressed(person: Person, shape: Float[ndarray, " k"] | None, rng: np.random.G
 
     Args:
         person: The bare person.
-        shape: The shape it was loaded with.
         rng: Draws the waves.
 
     Returns:
         The person in clothes; body and feet are unchanged.
     """
     skin = person.skin
-    Ts_root_link = load_rig(model_folder(), shape).Ts_root_link[skin.links]  # (V, 4, 4, 4)
-    vertices = np.einsum("vij,vj->vi", Ts_root_link[:, 0, :3, :3], skin.points_link[:, 0])
-    vertices = vertices + Ts_root_link[:, 0, :3, 3]
+    Ts_root_link = person.rig.Ts_root_link[skin.links]  # (V, 4, 4, 4)
+    vertices = person.bind_vertices
     directions = rng.normal(size=(CLOTH_WAVES, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     lengths = rng.uniform(*CLOTH_WAVE_M, size=CLOTH_WAVES)

@@ -3,12 +3,11 @@ import numpy as np
 
 from kintrack.body import run_kinematics
 from kintrack.skin import skinned_vertices
-from synthesis.demo import SHAPE
 from synthesis.people.person import CLOTH_MAX_M, CLOTH_MIN_M, dressed
 
 
 def _thickness(person):
-    clothed = dressed(person, np.array(SHAPE), np.random.default_rng(1))
+    clothed = dressed(person, np.random.default_rng(1))
     state = run_kinematics(person.body, person.body.neutral())
     moved = skinned_vertices(state, clothed.skin) - skinned_vertices(state, person.skin)
     return np.linalg.norm(moved, axis=1)
