@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where commands print, and their progress bars."""
+
+from __future__ import annotations
+
+import time
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from kintrack.result import FrameResult
+from kintrack.sequence.frame import Frame
+
+console = Console()
+errors = Console(stderr=True, soft_wrap=True)
+
+
+class FitProgress:
+    """A bar with frame, speed, residual and status; one line at a time where nobody watches."""
+
+    def __init__(self, total: int):
+        self._bar = Progress(
+            TextColumn("fitting"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[note]}"),
+            TimeRemainingColumn(),
+            console=console,
+        )
+        self._task = self._bar.add_task("fit", total=total, note="")
+        self._began = time.perf_counter()
+        self._done = 0
+
+    def __enter__(self) -> FitProgress:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def __call__(self, frame: Frame, result: FrameResult) -> None:
+        """Count a frame."""
+        self._done += 1
+        fps = self._done / (time.perf_counter() - self._began)
+        note = f"{fps:.0f} fps  {1e3 * result.residual_rms_m:.0f} mm  {result.status}"
+        self._bar.update(self._task, completed=self._done, note=note)
