@@ -9,7 +9,12 @@ from dataclasses import dataclass, field, fields
 from kintrack.errors import ConfigError
 
 
-def _check(config, **bounds: tuple[float, float]) -> None:
+def check_bounds(config, **bounds: tuple[float, float]) -> None:
+    """Pass if every named field of a config dataclass lies within its bounds.
+
+    Raises:
+        ConfigError: if one does not, or is no whole number where the field is an int.
+    """
     whole = {f.name for f in fields(config) if f.type in (int, "int")}
     for name, (low, high) in bounds.items():
         value = getattr(config, name)
@@ -52,7 +57,7 @@ class AssociationConfig:
     """Observed points further than this from the predicted body's box are ignored [m]."""
 
     def __post_init__(self) -> None:
-        _check(
+        check_bounds(
             self,
             max_width_px=(64, 4096),
             gate_m=(0.01, 1.0),
@@ -85,7 +90,7 @@ class SurfaceConfig:
     """How many neighbouring pairs carry the information of one independent pair."""
 
     def __post_init__(self) -> None:
-        _check(
+        check_bounds(
             self,
             point_weight=(0.0, 10.0),
             scale_floor_m=(1e-4, 0.1),
@@ -109,7 +114,7 @@ class PriorConfig:
     """Time in which a limb that nobody sees relaxes towards rest [s]."""
 
     def __post_init__(self) -> None:
-        _check(
+        check_bounds(
             self,
             limb_rad=(0.01, 10),
             trunk_rad=(0.01, 10),
@@ -134,7 +139,7 @@ class MotionConfig:
     """Share of the last velocity that is carried on."""
 
     def __post_init__(self) -> None:
-        _check(
+        check_bounds(
             self,
             root_m_s=(1e-3, 100),
             root_rad_s=(1e-3, 100),
@@ -158,7 +163,7 @@ class SolverConfig:
     """Stop when no reported joint moves further than this in a round [m]."""
 
     def __post_init__(self) -> None:
-        _check(self, rounds=(1, 100), steps=(1, 100), damping=(0, 1e6), tolerance_m=(0, 1))
+        check_bounds(self, rounds=(1, 100), steps=(1, 100), damping=(0, 1e6), tolerance_m=(0, 1))
 
 
 @dataclass(frozen=True)
@@ -179,7 +184,7 @@ class StartConfig:
     """Largest shape coefficient [standard deviations]."""
 
     def __post_init__(self) -> None:
-        _check(
+        check_bounds(
             self,
             min_height_m=(0.2, 2.5),
             max_height_m=(0.3, 4.0),
@@ -213,7 +218,7 @@ class JudgeConfig:
     """Bad frames in a row before the track is lost."""
 
     def __post_init__(self) -> None:
-        _check(
+        check_bounds(
             self,
             max_rms_m=(1e-3, 1),
             min_explained=(0, 1),

@@ -6,80 +6,56 @@ python -m synthesis.demo OUT
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
 import tyro
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.body import run_kinematics
-from kintrack.geometry import PinholeCamera, invert_rigid, transform_points
 from kintrack.sequence.write import SequenceWriter
-from kintrack.skin import skinned_vertices
-from synthesis.motions.motion import RATE_HZ, Motion, perform
+from synthesis.film import film
+from synthesis.motions.motion import perform
 from synthesis.motions.scripts import demo
-from synthesis.people.person import Person, dressed, load_person
-from synthesis.render.camera import level_camera, look
-from synthesis.sensors.models import Sensor, kinect_v1
+from synthesis.people.person import load_person
+from synthesis.people.wardrobe import dress
+from synthesis.render.lights import Lights
+from synthesis.render.placing import level_camera
+from synthesis.scene import Scene
+from synthesis.sensors.catalogue import SENSORS
+from synthesis.sensors.sensor import Sensor
 
-KINECT_V1 = PinholeCamera(width=320, height=240, fx=285.6, fy=285.6, cx=160.0, cy=120.0)
-SHAPE = (0.8, -0.6, 0.5, 0.3)
-"""Build of the person [standard deviations of the adult population]."""
+PERSON = 425
+"""Who is filmed: a strong man of 31 years, one that nothing is trained on."""
 DISTANCE_M, HEIGHT_M = 3.0, 1.0
 """Where the level camera stands: from the person's start, above the floor [m]."""
+DARK = Lights(sky=np.zeros(3), ground=np.zeros(3))
+"""The sensor's own light is enough for depth."""
 PNG_COMPRESSION = 9
 
 
-@dataclass(frozen=True)
-class Exposure:
-    """One frame with its truth."""
-
-    depth_m: Float[ndarray, "h w"]
-    """Depth as the sensor reports it [m], 0 = no reading."""
-    true_depth_m: Float[ndarray, "h w"]
-    """Depth without noise [m], 0 = nothing there."""
-    labels: UInt8[ndarray, "h w"]
-    """True part labels."""
-    joint_positions_camera_m: Float[ndarray, "j 3"]
-    """True joint centres, camera frame [m]."""
-
-
-def film(
-    person: Person,
-    motion: Motion,
-    camera: PinholeCamera,
-    T_world_camera: Float[ndarray, "4 4"],
-    sensor: Sensor,
-    rng: np.random.Generator,
-) -> Iterator[Exposure]:
-    """Record a motion.
+def demo_scene(sensor: Sensor, outfit: np.random.Generator) -> Scene:
+    """The person of the demo before a sensor, nothing around.
 
     Args:
-        person: Who moves.
-        motion: How.
-        camera: Depth camera.
-        T_world_camera: Its pose; the floor is z = 0.
-        sensor: How it misreads.
-        rng: Draws the noise.
-
-    Yields:
-        One exposure a frame of the motion.
+        sensor: The sensor.
+        outfit: Draws what is worn.
     """
-    for q in motion.q:
-        state = run_kinematics(person.body, q)
-        view = look(skinned_vertices(state, person.skin), person.skin.faces, camera, T_world_camera)
-        yield Exposure(
-            depth_m=sensor(view, rng),
-            true_depth_m=view.depth_m,
-            labels=view.labels(person.skin.faces, person.skin.labels),
-            joint_positions_camera_m=transform_points(
-                invert_rigid(T_world_camera), state.joint_positions_world
-            ),
-        )
+    person = load_person(PERSON)
+    motion = perform(person, demo())
+    T_world_camera: Float[ndarray, "4 4"] = level_camera(DISTANCE_M, HEIGHT_M)
+    return Scene(
+        figure=dress(person, outfit),
+        motion=motion,
+        held=(),
+        fixed=None,
+        lights=DARK,
+        sensor=sensor,
+        color=None,
+        Ts_world_camera=np.tile(T_world_camera, (len(motion.q), 1, 1)),
+        stride=1,
+    )
 
 
 def write_demo_sequence(folder: Path, seed: int = 0) -> None:
@@ -95,16 +71,12 @@ def write_demo_sequence(folder: Path, seed: int = 0) -> None:
     Raises:
         ResultError: if the folder cannot be written.
     """
-    rng = np.random.default_rng(seed)
-    shape = np.array(SHAPE)
-    person = dressed(load_person(shape), rng)
-    motion = perform(person, demo())
-    writer = SequenceWriter(folder, KINECT_V1, overwrite=True)
-    T_world_camera = level_camera(DISTANCE_M, HEIGHT_M)
-    exposures = film(person, motion, KINECT_V1, T_world_camera, kinect_v1, rng)
-    for n, exposure in enumerate(exposures):
+    outfit, noise = np.random.default_rng(seed).spawn(2)
+    scene = demo_scene(SENSORS["kinect_v1_320"](), outfit)
+    writer = SequenceWriter(folder, scene.sensor.camera, overwrite=True)
+    for exposure in film(scene, noise):
         writer.write(
-            n / RATE_HZ,
+            exposure.timestamp_s,
             exposure.depth_m,
             labels=exposure.labels,
             joint_positions_m=exposure.joint_positions_camera_m,

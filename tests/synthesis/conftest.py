@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-import numpy as np
 import pytest
 
-from synthesis.demo import SHAPE
+from synthesis.demo import PERSON
 from synthesis.people.person import Person, load_person
 
 
 @pytest.fixture(scope="session")
 def person() -> Person:
-    return load_person(np.array(SHAPE))
+    return load_person(PERSON)

@@ -11,23 +11,20 @@ from kintrack.joints import JOINT_NAMES
 from kintrack.sequence import open_sequence
 from kintrack.sequence.reference import read_reference_joints
 from synthesis import demo
-from synthesis.motions.motion import perform
+from synthesis.film import film
 from synthesis.motions.scripts import demo as demo_script
-from synthesis.people.person import dressed
-from synthesis.render.camera import level_camera
-from synthesis.sensors.models import perfect
+from synthesis.sensors.catalogue import SENSORS
 
 SHIPPED = Path(kintrack.__file__).parent / "demo"
+CAMERA = SENSORS["kinect_v1_320"]().camera
 TRUNK = [JOINT_NAMES.index(name) for name in ("pelvis", "spine", "chest", "neck")]
 
 
 @pytest.fixture(scope="module")
-def exposures(person):
-    rng = np.random.default_rng(0)
-    clothed = dressed(person, rng)
-    motion = perform(person, demo_script())
-    T_world_camera = level_camera(demo.DISTANCE_M, demo.HEIGHT_M)
-    return list(demo.film(clothed, motion, demo.KINECT_V1, T_world_camera, perfect, rng))[::6]
+def exposures():
+    sensor = SENSORS["perfect"]().with_camera(CAMERA)
+    scene = replace(demo.demo_scene(sensor, np.random.default_rng(0)), stride=6)
+    return list(film(scene, np.random.default_rng(0)))
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +66,7 @@ def test_truth_covers_the_same_pixels_as_depth_before_noise(exposures):
 def test_trunk_joints_lie_inside_the_silhouette_and_behind_the_surface(exposures):
     for exposure in exposures:
         joints = exposure.joint_positions_camera_m[TRUNK]
-        u, v = np.rint(demo.KINECT_V1.project(joints)).astype(int).T
+        u, v = np.rint(CAMERA.project(joints)).astype(int).T
         assert np.all(exposure.labels[v, u] > 0)
         assert np.all(exposure.true_depth_m[v, u] < joints[:, 2])
 

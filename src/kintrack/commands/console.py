@@ -6,7 +6,14 @@ from __future__ import annotations
 import time
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
 
 from kintrack.result import FrameResult
 from kintrack.sequence.frame import Frame
@@ -44,3 +51,31 @@ class FitProgress:
         fps = self._done / (time.perf_counter() - self._began)
         note = f"{fps:.0f} fps  {1e3 * result.residual_rms_m:.0f} mm  {result.status}"
         self._bar.update(self._task, completed=self._done, note=note)
+
+
+class StepProgress:
+    """A bar for work of several steps, each with frames done, frames in total and time left."""
+
+    def __init__(self) -> None:
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("frames, left"),
+            TimeRemainingColumn(),
+            console=console,
+        )
+        self._tasks: dict[str, TaskID] = {}
+
+    def __enter__(self) -> StepProgress:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def __call__(self, what: str, done: int, total: int) -> None:
+        """Show how far a step is."""
+        if what not in self._tasks:
+            self._tasks[what] = self._bar.add_task(what, total=total)
+        self._bar.update(self._tasks[what], completed=done)

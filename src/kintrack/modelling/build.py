@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float, Int
 from numpy import ndarray
 
 from kintrack.errors import ConfigError, ModelError
@@ -77,7 +78,7 @@ def build_model(folder: Path, config: ModelBuildConfig, progress=print) -> None:
     basis = np.einsum("tc,ktcd->ktd", bary, source.vertices_basis[:, corners])
     _save_skin(skin / "tracking.npz", vertices, faces, weights, basis)
     points, points_basis = dict(source.points), dict(source.points_basis)
-    centre = _head_centre(vertices, faces, weights)
+    centre = head_centre(vertices, faces, weights)
     points["head_center"], points_basis["head_center"] = centre @ vertices, centre @ basis
     _save_skin(
         skin / "display.npz", source.vertices, source.faces, source.weights, source.vertices_basis
@@ -94,8 +95,12 @@ def build_model(folder: Path, config: ModelBuildConfig, progress=print) -> None:
     progress(f"{len(vertices)} + {len(source.vertices)} vertices in {folder}")
 
 
-def _head_centre(vertices: ndarray, faces: ndarray, weights: ndarray) -> ndarray:
-    """Weights (V,) of the vertices in the area centroid of the head's closed surface."""
+def head_centre(
+    vertices: Float[ndarray, "v 3"],
+    faces: Int[ndarray, "f 3"],
+    weights: Float[ndarray, "v l"],
+) -> Float[ndarray, " v"]:
+    """Share of each vertex of the tracking skin in the area centroid of the head's surface."""
     head = weights[:, [link.name for link in links()].index("head")] > 0.5
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6

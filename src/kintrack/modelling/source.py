@@ -105,12 +105,13 @@ def load_average_adult(samples: int, components: int, seed: int) -> SourceBody:
         np.concatenate(heads),
         list(model.bone_labels),
         model.faces.numpy(),
-        _dense_weights(model),
+        dense_weights(model),
         components,
     )
 
 
-def _dense_weights(model) -> Float[ndarray, "v b"]:
+def dense_weights(model) -> Float[ndarray, "v b"]:
+    """Skinning weights of a source model over all of its bones."""
     index = model.vertex_bone_indices.numpy()
     dense = np.zeros((len(index), len(model.bone_labels)))
     np.add.at(dense, (np.arange(len(index))[:, None], index), model.vertex_bone_weights.numpy())
@@ -121,7 +122,7 @@ def _summarise(vertices, heads, bones, faces, bone_weights, components) -> Sourc
     tree = links()
     weights = bone_weights @ bone_link_matrix(bones, tree)
     weights /= weights.sum(axis=1, keepdims=True)
-    points = _points(heads, bones, tree)
+    points = joint_points(heads, bones, tree)
     origin = points["pelvis"].copy()
     vertices = vertices - origin[:, None]
     points = {name: p - origin for name, p in points.items()}
@@ -156,8 +157,19 @@ def _summarise(vertices, heads, bones, faces, bone_weights, components) -> Sourc
     )
 
 
-def _points(heads, bones, tree) -> dict[str, Float[ndarray, "n 3"]]:
-    """Link origins, hands and toes of every person, all linear in the source body."""
+def joint_points(
+    heads: Float[ndarray, "n b 3"], bones: list[str], tree: tuple[Link, ...]
+) -> dict[str, Float[ndarray, "n 3"]]:
+    """Link origins, hands and toes of every person, all linear in the source body.
+
+    Args:
+        heads: Where the source's bones start, shape (N, B, 3) [m].
+        bones: Names of the source's bones.
+        tree: Links of the human.
+
+    Returns:
+        Name of the link or of one of `EXTRA_POINTS` -> positions (N, 3), axes as given [m].
+    """
 
     def bone(name: str):
         return heads[:, bones.index(name)]

@@ -17,13 +17,14 @@ from kintrack.geometry import PinholeCamera
 from kintrack.joints import JOINT_NAMES
 from kintrack.sequence.camera_file import check_positive, write_camera_file
 from kintrack.sequence.images import encode_depth
+from kintrack.sequence.occlusion import OCCLUSION_FILE, OCCLUSION_HEADER, occlusion_row
 from kintrack.sequence.reference import JOINTS_HEADER, check_joint_names, reference_rows
 
 INDEX_HEADER = "# timestamp_s filename\n"
 JPEG_QUALITY = 95
 
 _IMAGES = ("depth/*.png", "rgb/*.jpg", "labels/*.png")
-_TABLES = ("depth.txt", "rgb.txt", "reference_joints.csv", "camera.json")
+_TABLES = ("depth.txt", "rgb.txt", "reference_joints.csv", OCCLUSION_FILE, "camera.json")
 
 
 class SequenceWriter:
@@ -86,6 +87,8 @@ class SequenceWriter:
         color: UInt8[ndarray, "h w 3"] | None = None,
         labels: UInt8[ndarray, "h2 w2"] | None = None,
         joint_positions_m: Float[ndarray, "j 3"] | None = None,
+        hidden_share: float | None = None,
+        hidden_joints: Sequence[str] = (),
     ) -> None:
         """Append a frame.
 
@@ -97,6 +100,8 @@ class SequenceWriter:
             labels: True part labels, shape (h2, w2).
             joint_positions_m: Joint centres in the depth camera's frame [m], shape (J, 3) in the
                 order of `joint_names`; rows with NaN are left out.
+            hidden_share: Share of the person's pixels that something hides, 0..1.
+            hidden_joints: Names of the joints that something hides; needs `hidden_share`.
 
         Raises:
             ResultError: if an array has a wrong shape, the time stamp does not increase, or the
@@ -126,6 +131,9 @@ class SequenceWriter:
             if joint_positions_m is not None:
                 rows = reference_rows(self._frames, self.joint_names, joint_positions_m)
                 self._append("reference_joints.csv", rows, header=JOINTS_HEADER + "\n")
+            if hidden_share is not None:
+                row = occlusion_row(self._frames, hidden_share, hidden_joints)
+                self._append(OCCLUSION_FILE, row, header=OCCLUSION_HEADER)
         self._last_us = now_us
         self._frames += 1
 

@@ -9,59 +9,37 @@ run through keys. The person starts at the origin, looking along x.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Bool, Float
 from numpy import ndarray
-from scipy.ndimage import minimum_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from kintrack.body import run_kinematics
-from synthesis.motions.curves import SMOOTH_S, keyed, minimum_jerk, smooth
-from synthesis.motions.legs import LEG_HINGES, foot_pose, solve_legs, yaw_matrix
+from synthesis.motions.curves import keyed, smooth
+from synthesis.motions.footwork import (
+    Footwork,
+    Gait,
+    Stance,
+    Step,
+    footwork,
+    neutral_position,
+)
+from synthesis.motions.legs import LEG_HINGES, solve_legs, yaw_matrix
 from synthesis.people.person import SIDES, Person
 
 RATE_HZ = 30.0
-NARROWER_M = 0.03
-"""How much further in than below the hip a foot stands [m]."""
-TOE_OUT_RAD = np.radians(8.0)
 BENT_DEG = (15.0, 0.0, 0.0, 30.0, 15.0, 0.0)
 """`LEG_HINGES` from which the first frame's legs are solved: knees forward [deg]."""
 REACH = 0.993
 """Longest distance from hip to ankle, as a share of the straight leg."""
-FOLLOW_S = 0.13
-"""Standard deviation of the Gaussian by which the pelvis lags the feet [s]."""
-WEIGHT_SHIFT = 0.35
-"""How far the pelvis moves over the standing foot while the other swings, share of the way."""
-ROLL_S, LAND_S = 0.16, 0.10
-"""How long the foot rolls over the toe before a swing, and over the heel after it [s]."""
-HEEL_OFF_RAD, HEEL_STRIKE_RAD = np.radians(28.0), np.radians(12.0)
-"""Pitch of a full step's foot when it leaves and when it lands [rad]."""
-FULL_STEP_M = 0.5
-"""Step with the full foot pitch [m]; shorter ones pitch less."""
-LIFT_M = 0.035
-"""Ground clearance of a full step; half as much for a step in place [m]."""
 PELVIS = ("forward", "left", "drop", "yaw", "pitch", "roll")
 """Pelvis channels, relative to where the feet carry it: leg lengths, then degrees."""
-
-
-@dataclass(frozen=True)
-class Step:
-    """One foot moves to a new foothold."""
-
-    side: str
-    """`l` or `r`."""
-    start_s: float
-    """When the foot leaves the floor [s]."""
-    end_s: float
-    """When it stands again [s]."""
-    forward_m: float
-    """Displacement from where this foot started the motion, along x [m]."""
-    left_m: float
-    """The same along y [m]."""
-    yaw_deg: float
-    """Turn from how this foot started [deg]."""
+LOWERINGS = 60
+"""Rounds in which the pelvis' height is lowered to what the legs allow."""
+LIMIT_MARGIN_RAD = 0.002
+"""How far inside its limits a scripted hinge stays [rad]."""
 
 
 @dataclass(frozen=True)
@@ -71,23 +49,18 @@ class Script:
     duration_s: float
     """How long [s]."""
     keys: Mapping[str, tuple[tuple[float, float], ...]]
-    """Hinge or `pelvis_` channel -> (time [s], value [deg or leg lengths])."""
+    """Hinge, `pelvis_` channel, or `l_heel`, `r_heel`, how far a standing foot's heel is raised ->
+    (time [s], value [deg or leg lengths])."""
     steps: tuple[Step, ...] = ()
     """Steps in time order."""
-
-
-@dataclass(frozen=True)
-class Footwork:
-    """One foot through a script."""
-
-    footholds: Float[ndarray, "n 3"]
-    """x, y [m] and yaw [rad] of the flat foot."""
-    swinging: Float[ndarray, " n"]
-    """1 while the foot is on its way, else 0."""
-    planted: Bool[ndarray, " n"]
-    """True where the foot stands flat."""
-    Ts_world_foot: list[pin.SE3]
-    """Pose of the foot in each of the N frames."""
+    stance: Stance = Stance()
+    """Where the feet stand at first."""
+    gait: Gait = Gait()
+    """How they step."""
+    curves: Mapping[str, Float[ndarray, " n"]] = field(default_factory=dict)
+    """Added to the keys: channel -> a value for every frame [deg or leg lengths]."""
+    breath_rad: float = 0.0
+    """Phase of breath and sway at the start [rad]."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +75,11 @@ class Motion:
     """Per side, True where the foot stands flat on its foothold."""
 
 
+def frame_times(duration_s: float, rate_hz: float = RATE_HZ) -> Float[ndarray, " n"]:
+    """Times of the frames of a script [s]; frame n is at n / rate_hz."""
+    return np.arange(round(duration_s * rate_hz)) / rate_hz
+
+
 def perform(person: Person, script: Script, rate_hz: float = RATE_HZ) -> Motion:
     """Run a script.
 
@@ -113,117 +91,129 @@ def perform(person: Person, script: Script, rate_hz: float = RATE_HZ) -> Motion:
     Returns:
         The motion; frame n is at n / rate_hz.
     """
-    times_s = np.arange(round(script.duration_s * rate_hz)) / rate_hz
+    times_s = frame_times(script.duration_s, rate_hz)
     curves = {name: keyed(keys, times_s, rate_hz) for name, keys in script.keys.items()}
-    for name, values in _idle(times_s).items():
-        curves[name] = curves.get(name, 0.0) + values
+    for added in (script.curves, _idle(times_s, script.breath_rad)):
+        for name, values in added.items():
+            curves[name] = curves.get(name, 0.0) + values
     pelvis = {name: curves.pop(f"pelvis_{name}", np.zeros(len(times_s))) for name in PELVIS}
+    heels = {side: curves.pop(f"{side}_heel", np.zeros(len(times_s))) for side in SIDES}
     body = person.body
     q = np.tile(body.neutral(), (len(times_s), 1))
     for name, values in curves.items():
-        q[:, body.dof(name) + 1] = np.radians(values)
-    feet = {side: _footwork(person, side, script.steps, times_s) for side in SIDES}
+        k = body.dof(name)
+        q[:, k + 1] = np.clip(
+            np.radians(values), body.lower[k] + LIMIT_MARGIN_RAD, body.upper[k] - LIMIT_MARGIN_RAD
+        )
+    feet = {
+        side: footwork(person, side, script.steps, script.stance, script.gait, times_s, heels[side])
+        for side in SIDES
+    }
     legs = np.array([body.dof(f"{s}_{hinge}") + 1 for s in SIDES for hinge in LEG_HINGES])
     bent = np.radians(2 * BENT_DEG)
-    for n, T in enumerate(_pelvis_path(person, feet, pelvis, rate_hz)):
+    longest_m = REACH * leg_length(person)
+    hips = {side: neutral_position(person, f"{side}_thigh") for side in SIDES}
+    for n, T in enumerate(_pelvis_path(person, feet, pelvis, script.gait, rate_hz)):
         q[n, :7] = pin.SE3ToXYZQUAT(T)
         q[n, legs] = bent
-        q[n] = solve_legs(body, q[n], {side: feet[side].Ts_world_foot[n] for side in SIDES})
+        targets = {
+            side: _within_reach(feet[side].Ts_world_foot[n], T.act(hips[side]), longest_m)
+            for side in SIDES
+        }
+        q[n] = solve_legs(body, q[n], targets)
         bent = q[n, legs]
     return Motion(times_s, q, {side: feet[side].planted for side in SIDES})
 
 
-def _neutral_position(person: Person, link: str) -> Float[ndarray, " 3"]:
-    """Origin of a link in zero pose, relative to the pelvis [m]."""
-    state = run_kinematics(person.body, person.body.neutral())
-    return state.Ts_world_link[person.skin.link_names.index(link)][:3, 3]
-
-
-def _leg_length(person: Person) -> float:
+def leg_length(person: Person) -> float:
     """Hip to ankle of the straight leg [m]."""
-    hip, knee, ankle = (_neutral_position(person, f"l_{s}") for s in ("thigh", "shank", "foot"))
+    hip, knee, ankle = (neutral_position(person, f"l_{s}") for s in ("thigh", "shank", "foot"))
     return float(np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee))
 
 
-def _idle(times_s: Float[ndarray, " n"]) -> dict[str, Float[ndarray, " n"]]:
+def _idle(times_s: Float[ndarray, " n"], phase_rad: float) -> dict[str, Float[ndarray, " n"]]:
     """Breath and sway of somebody who stands still; degrees and leg lengths."""
-    breath = np.sin(2.0 * np.pi * 0.27 * times_s)
+    breath = np.sin(2.0 * np.pi * 0.27 * times_s + phase_rad)
     return {
         "chest_flexion": -0.5 * breath,
         "l_clavicle_elevation": 0.8 * breath,
         "r_clavicle_elevation": 0.8 * breath,
-        "head_flexion": 0.7 * np.sin(2.0 * np.pi * 0.19 * times_s + 1.0),
-        "head_rotation": 0.9 * np.sin(2.0 * np.pi * 0.13 * times_s + 0.4),
-        "pelvis_left": 0.005 * np.sin(2.0 * np.pi * 0.21 * times_s + 0.3),
-        "pelvis_forward": 0.003 * np.sin(2.0 * np.pi * 0.33 * times_s),
+        "head_flexion": 0.7 * np.sin(2.0 * np.pi * 0.19 * times_s + 1.0 + phase_rad),
+        "head_rotation": 0.9 * np.sin(2.0 * np.pi * 0.13 * times_s + 0.4 + phase_rad),
+        "pelvis_left": 0.005 * np.sin(2.0 * np.pi * 0.21 * times_s + 0.3 + phase_rad),
+        "pelvis_forward": 0.003 * np.sin(2.0 * np.pi * 0.33 * times_s + phase_rad),
     }
-
-
-def _footwork(
-    person: Person, side: str, steps: tuple[Step, ...], times_s: Float[ndarray, " n"]
-) -> Footwork:
-    """Where a foot is: on a foothold, rolling over toe or heel, or swinging to the next."""
-    outward = 1.0 if side == "l" else -1.0
-    start = _neutral_position(person, f"{side}_foot")
-    first = np.array([start[0], start[1] - outward * NARROWER_M, outward * TOE_OUT_RAD])
-    footholds = np.tile(first, (len(times_s), 1))
-    pitch, lift, swinging = np.zeros((3, len(times_s)))
-    here = first
-    for step in (step for step in steps if step.side == side):
-        there = first + [step.forward_m, step.left_m, np.radians(step.yaw_deg)]
-        way = (there - here)[:2]
-        size = min(1.0, float(np.linalg.norm(way)) / FULL_STEP_M)
-        ahead = float(way @ [np.cos(here[2]), np.sin(here[2])]) / FULL_STEP_M
-        u = (times_s - step.start_s) / (step.end_s - step.start_s)
-        swing = (u > 0.0) & (u < 1.0)
-        footholds[u >= 0.0] = here + minimum_jerk(u[u >= 0.0])[:, None] * (there - here)
-        leaving = minimum_jerk((times_s - step.start_s) / ROLL_S + 1.0) * (u <= 0.0)
-        landing = minimum_jerk((step.end_s - times_s) / LAND_S + 1.0) * (u >= 1.0)
-        turned = minimum_jerk(u / 0.9)
-        pitch += HEEL_OFF_RAD * size * (leaving + swing * (1.0 - turned))
-        pitch -= HEEL_STRIKE_RAD * np.clip(ahead, 0.0, 1.0) * (landing + swing * turned)
-        lift += LIFT_M * 0.5 * (1.0 + size) * swing * np.sin(np.pi * u) ** 2
-        swinging += swing
-        here = there
-    poses = zip(footholds, pitch, lift, strict=True)
-    return Footwork(
-        footholds,
-        swinging,
-        (swinging == 0.0) & (np.abs(pitch) < 1e-9),
-        [foot_pose(person, side, *pose) for pose in poses],
-    )
 
 
 def _pelvis_path(
     person: Person,
     feet: dict[str, Footwork],
     pelvis: dict[str, Float[ndarray, " n"]],
+    gait: Gait,
     rate_hz: float,
 ) -> list[pin.SE3]:
-    """Pose of the pelvis: between the feet, over the standing one, as high as the legs allow."""
+    """Pose of the pelvis: between the feet, over the standing one, as high as standing legs allow."""
     left, right = feet["l"], feet["r"]
-    lean = smooth(WEIGHT_SHIFT * (right.swinging - left.swinging), rate_hz, FOLLOW_S)
+    lean = smooth(gait.weight_shift * (right.swinging - left.swinging), rate_hz, gait.follow_s)
     aside = (left.footholds - right.footholds) * [1.0, 1.0, 0.0]
     between = 0.5 * (left.footholds + right.footholds + lean[:, None] * aside)
     between[:, 2] -= between[0, 2]
-    between = smooth(between, rate_hz, FOLLOW_S)
-    leg_m = _leg_length(person)
-    ahead_m = leg_m * pelvis["forward"] - 0.5 * (left.footholds[0, 0] + right.footholds[0, 0])
+    between = smooth(between, rate_hz, gait.follow_s)
+    leg_m = leg_length(person)
+    ankle_x = 0.5 * (left.footholds[0, 0] + right.footholds[0, 0])
+    ahead_m = leg_m * pelvis["forward"] - ankle_x
     angles = np.radians([pelvis["roll"], pelvis["pitch"], pelvis["yaw"]]).T
     R, p = [], np.zeros((len(lean), 3))
     for n, (x, y, yaw) in enumerate(between):
         R_yaw = yaw_matrix(yaw)
         R.append(R_yaw @ pin.rpy.rpyToMatrix(*angles[n]))
         p[n] = np.array([x, y, 0.0]) + R_yaw @ [ahead_m[n], leg_m * pelvis["left"][n], 0.0]
-    ceiling = np.full(len(R), np.inf)
+    ceiling, upright_m = np.full(len(R), np.inf), np.inf
+    start = np.array([between[0, 0] - ankle_x, between[0, 1], 0.0])
     for side in SIDES:
-        hip_pelvis = _neutral_position(person, f"{side}_thigh")
-        for n, target in enumerate(feet[side].Ts_world_foot):
-            hip = p[n] + R[n] @ hip_pelvis
-            across = float(np.linalg.norm((hip - target.translation)[:2]))
-            up = np.sqrt(max((REACH * leg_m) ** 2 - across**2, 0.0))
-            ceiling[n] = min(ceiling[n], target.translation[2] + up - hip[2])
-    height = np.minimum(ceiling, ceiling[0] - leg_m * pelvis["drop"])
-    window = 2 * round(3.0 * SMOOTH_S * rate_hz) + 1
-    p[:, 2] = smooth(minimum_filter1d(height, window, mode="nearest"), rate_hz)
+        hip_pelvis = neutral_position(person, f"{side}_thigh")
+        targets = feet[side].Ts_world_foot
+        upright_m = min(upright_m, _highest(start + hip_pelvis, targets[0], leg_m) - hip_pelvis[2])
+        for n, target in enumerate(targets):
+            arm = R[n] @ hip_pelvis
+            if feet[side].swinging[n] == 0.0:
+                ceiling[n] = min(ceiling[n], _highest(p[n] + arm, target, leg_m) - arm[2])
+    wanted = np.minimum(ceiling, upright_m - leg_m * pelvis["drop"])
+    p[:, 2] = _below(wanted, ceiling, gait.settle_s, rate_hz)
     return [pin.SE3(R_n, p_n) for R_n, p_n in zip(R, p, strict=True)]
+
+
+def _below(
+    wanted: Float[ndarray, " n"],
+    ceiling: Float[ndarray, " n"],
+    settle_s: float,
+    rate_hz: float,
+) -> Float[ndarray, " n"]:
+    """A smooth curve near the wanted one and nowhere above the ceiling, lowered where it must be.
+
+    What sticks out is widened, smoothed and taken off until nothing does; the last resort is the
+    lowest value near each frame.
+    """
+    width = 2 * round(1.5 * settle_s * rate_hz) + 1
+    height = smooth(wanted, rate_hz, settle_s)
+    for _ in range(LOWERINGS):
+        excess = height - ceiling
+        if excess.max() <= 0.0:
+            return height
+        over = maximum_filter1d(np.maximum(excess + 1e-5, 0.0), width, mode="nearest")
+        height = height - smooth(over, rate_hz, settle_s)
+    window = 2 * round(3.0 * settle_s * rate_hz) + 1
+    return smooth(minimum_filter1d(wanted, window, mode="nearest"), rate_hz, settle_s)
+
+
+def _highest(hip: Float[ndarray, " 3"], foot: pin.SE3, leg_m: float) -> float:
+    """Height at which a hip above a place can still reach a foot [m]."""
+    across = float(np.linalg.norm((hip - foot.translation)[:2]))
+    return foot.translation[2] + np.sqrt(max((REACH * leg_m) ** 2 - across**2, 0.0))
+
+
+def _within_reach(foot: pin.SE3, hip: Float[ndarray, " 3"], longest_m: float) -> pin.SE3:
+    """A swinging foot's target, drawn towards the hip if the leg is too short for it."""
+    way = hip - foot.translation
+    excess = max(0.0, 1.0 - longest_m / float(np.linalg.norm(way)))
+    return pin.SE3(foot.rotation, foot.translation + excess * way)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from jaxtyping import Float
 from numpy import ndarray
@@ -34,3 +34,15 @@ class Performance:
     """The person's motion."""
     props: tuple[Prop, ...] = ()
     """Things that take part."""
+
+    def first(self, frames: int) -> Performance:
+        """Its first frames."""
+        motion = self.motion
+        planted = {side: flags[:frames] for side, flags in motion.planted.items()}
+        return replace(
+            self,
+            motion=Motion(motion.times_s[:frames], motion.q[:frames], planted),
+            props=tuple(
+                replace(prop, Ts_world_thing=prop.Ts_world_thing[:frames]) for prop in self.props
+            ),
+        )

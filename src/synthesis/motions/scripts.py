@@ -1,31 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The motions a person can perform, as keys and steps; see `synthesis.motion.Script`."""
+"""Short fixed motions as keys and steps; what varies is in `synthesis.motions.actions`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from synthesis.motions.arms import arm
-from synthesis.motions.motion import Script, Step
+from synthesis.motions.footwork import Step
+from synthesis.motions.motion import Script
+from synthesis.motions.poses import (
+    BALANCE,
+    FORWARD,
+    HANG,
+    LEANING,
+    LIFTING,
+    ON_HIP,
+    ON_THIGH,
+    OVERHEAD,
+    RISE,
+    SIDEWAYS,
+    SQUAT,
+    SWING_BACK,
+    SWING_FRONT,
+    TOGETHER,
+    WAVE_IN,
+    WAVE_OUT,
+    Pose,
+    both,
+    keys,
+    left,
+    right,
+    scaled,
+    still,
+)
 
-Pose = Mapping[str, float]
-
-HANG = arm(upper=(0.02, 0.16, -1), forearm=(0.28, 0.10, -1))
-SIDEWAYS = arm(upper=(0.05, 1, 0.0), forearm=(0.2, 1, 0.05), clavicle_deg=10)
-OVERHEAD = arm(upper=(0.15, 0.35, 1), forearm=(0.2, -0.05, 1), clavicle_deg=25)
-TOGETHER = arm(upper=(0.75, 0.12, -0.8), forearm=(1, -0.50, 0.25), pronation_deg=-10)
-ON_HIP = arm(upper=(-0.45, 0.75, -0.9), forearm=(0.42, -0.72, -0.75), pronation_deg=30)
-LIFTING = arm(upper=(0.6, 0.15, -0.8), forearm=(0.9, 0.0, -0.3))
-BALANCE = arm(upper=(0.8, 0.1, 0.45), forearm=(0.8, 0.0, 0.6), clavicle_deg=5)
-LEANING = arm(upper=(0.60, 0.25, -0.8), forearm=(1, -0.05, -0.3), pronation_deg=20)
-ON_THIGH = arm(upper=(0.25, 0.28, -1), forearm=(1, -0.22, -0.22), pronation_deg=50)
-REACH = arm(upper=(0.9, 0.05, -0.15), forearm=(1, -0.08, 0.18), clavicle_deg=8)
-WAVE_OUT = arm(upper=(0.3, 0.9, -0.1), forearm=(0.25, 0.5, 1), clavicle_deg=8, pronation_deg=-30)
-WAVE_IN = arm(upper=(0.3, 0.9, -0.1), forearm=(0.25, -0.3, 1), clavicle_deg=8, pronation_deg=-30)
-SWING_FRONT = arm(upper=(0.36, 0.14, -1), forearm=(0.75, 0.0, -1))
-SWING_BACK = arm(upper=(-0.40, 0.18, -1), forearm=(-0.05, 0.12, -1))
 SIT = {
     "pelvis_drop": 0.52,
     "pelvis_forward": -0.46,
@@ -35,63 +42,6 @@ SIT = {
     "neck_flexion": 0.0,
     "head_flexion": 0.0,
 }
-RISE = {
-    "pelvis_drop": 0.36,
-    "pelvis_forward": -0.34,
-    "pelvis_pitch": 34.0,
-    "spine_flexion": 16.0,
-    "chest_flexion": 8.0,
-    "neck_flexion": -8.0,
-    "head_flexion": -6.0,
-}
-SQUAT = {
-    "pelvis_drop": 0.46,
-    "pelvis_forward": -0.20,
-    "pelvis_pitch": 26.0,
-    "spine_flexion": 14.0,
-    "chest_flexion": 6.0,
-    "neck_flexion": -8.0,
-    "head_flexion": -12.0,
-}
-
-
-def both(pose: Pose) -> dict[str, float]:
-    """The same angles left and right."""
-    return {**left(pose), **right(pose)}
-
-
-def left(pose: Pose) -> dict[str, float]:
-    """Angles of the left side."""
-    return {f"l_{name}": angle for name, angle in pose.items()}
-
-
-def right(pose: Pose) -> dict[str, float]:
-    """Angles of the right side."""
-    return {f"r_{name}": angle for name, angle in pose.items()}
-
-
-def still(pose: Pose) -> dict[str, float]:
-    """Upright in the channels of a pose."""
-    return dict.fromkeys(pose, 0.0)
-
-
-def keys(*poses: tuple[float, Pose]) -> dict[str, tuple[tuple[float, float], ...]]:
-    """Curves from poses: each pose adds a key to the channels it names; arms begin hanging.
-
-    Args:
-        poses: (time [s], value by channel), times increasing.
-
-    Returns:
-        Keys of `Script`.
-    """
-    out = {name: [(0.0, value)] for name, value in both(HANG).items()}
-    for time_s, pose in poses:
-        for name, value in pose.items():
-            curve = out.setdefault(name, [] if time_s == 0.0 else [(0.0, 0.0)])
-            if curve and curve[-1][0] == time_s:
-                curve.pop()
-            curve.append((time_s, value))
-    return {name: tuple(curve) for name, curve in out.items()}
 
 
 def arms() -> Script:
@@ -158,7 +108,7 @@ def turn() -> Script:
 
 def demo() -> Script:
     """Wave, reach, bend the knees, step forward, turn the body by 30 degrees and back."""
-    bend = {name: 0.5 * value for name, value in SQUAT.items()}
+    bend = scaled(SQUAT, 0.5)
     level = {"pelvis_yaw": 0.0, "spine_rotation": 0.0, "chest_rotation": 0.0, "head_rotation": 0.0}
     turned = {
         "pelvis_yaw": 10.0,
@@ -175,9 +125,9 @@ def demo() -> Script:
         (1.25, right(WAVE_IN)),
         (1.10, left(HANG) | still(lean)),
         (1.42, left(LIFTING)),
-        (1.75, right(HANG) | left(REACH) | lean),
+        (1.75, right(HANG) | left(FORWARD) | lean),
         (1.80, still(bend)),
-        (1.90, left(REACH) | lean),
+        (1.90, left(FORWARD) | lean),
         (2.30, bend),
         (2.20, left(LIFTING)),
         (2.50, left(HANG) | {"chest_rotation": 0.0}),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A person of a given shape, with the display skin, the soles and, if wanted, clothes."""
+"""A person of the population, with the display skin, the soles and, if wanted, clothes."""
 
 from __future__ import annotations
 
@@ -9,10 +9,19 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.body import Body, Rig, load_body, load_rig, model_folder, run_kinematics
+from kintrack.body import (
+    Body,
+    Rig,
+    load_body,
+    load_rig,
+    model_folder,
+    rigged_body,
+    run_kinematics,
+)
+from kintrack.geometry import invert_rigid
 from kintrack.skin import Skin, load_skin, skinned_vertices, vertex_normals
+from synthesis.people.population import SIDES, Facts, Hands, load_population
 
-SIDES = ("l", "r")
 SOLE_HEIGHT_M = 0.012
 """How far above its lowest point a foot counts as sole [m]."""
 CLOTH_MIN_M, CLOTH_MAX_M = 0.005, 0.015
@@ -42,33 +51,59 @@ class Person:
     """Rearmost point of each sole in the foot's frame [m]."""
     toe: dict[str, Float[ndarray, " 3"]]
     """Foremost point of each sole in the foot's frame [m]."""
+    facts: Facts
+    """Sex, age, height, mass."""
 
 
-def load_person(shape: Float[ndarray, " k"] | None = None) -> Person:
-    """A bare person.
+def load_person(index: int, hands: Hands = "relaxed") -> Person:
+    """A bare person of the population.
 
     Args:
-        shape: Shape coefficients [standard deviations]; the average adult if None.
+        index: Who, see `synthesis.people.population`.
+        hands: `open`, `relaxed` or `closed`; or one per side, where a side left out is relaxed.
 
     Returns:
-        The person.
+        The person. Joints are the person's own points, by the model's definitions; link frames are
+        turned as the model's are.
+
+    Raises:
+        SceneError: if there is no such person or no such shape of a hand.
     """
-    body, skin = load_body(shape=shape), load_skin("display", shape=shape)
-    rig = load_rig(model_folder(), shape)
-    T = rig.Ts_root_link[skin.links[:, 0]]
-    bind_vertices = np.einsum("vij,vj->vi", T[:, :3, :3], skin.points_link[:, 0]) + T[:, :3, 3]
+    population = load_population()
+    vertices, points = population.body(index, hands)
+    rig = _rig(points)
+    body = rigged_body(model_folder(), rig)
+    skin = load_skin("display")
+    Ts_link_root = invert_rigid(rig.Ts_root_link)[skin.links]
+    points_link = np.einsum("vbij,vj->vbi", Ts_link_root[..., :3, :3], vertices)
+    points_link += Ts_link_root[..., :3, 3]
+    skin = replace(skin, points_link=np.ascontiguousarray(points_link))
     state = run_kinematics(body, body.neutral())
-    vertices = skinned_vertices(state, skin)
-    points, heel, toe = {}, {}, {}
+    posed = skinned_vertices(state, skin)
+    foot_points, heel, toe = {}, {}, {}
     for side in SIDES:
         link = skin.link_names.index(f"{side}_foot")
         of_foot = (skin.weights * (skin.links == link)).sum(axis=1) > 0.9
         T = state.Ts_world_link[link]
-        foot = (vertices[of_foot] - T[:3, 3]) @ T[:3, :3]
+        foot = (posed[of_foot] - T[:3, 3]) @ T[:3, :3]
         sole = foot[foot[:, 2] < foot[:, 2].min() + SOLE_HEIGHT_M]
-        points[side] = foot
+        foot_points[side] = foot
         heel[side], toe[side] = sole[sole[:, 0].argmin()], sole[sole[:, 0].argmax()]
-    return Person(body, skin, rig, bind_vertices, points, heel, toe)
+    return Person(body, skin, rig, vertices, foot_points, heel, toe, population.facts(index))
+
+
+def _rig(points: dict[str, Float[ndarray, " 3"]]) -> Rig:
+    """Link frames at a person's own joints, and by how much the other fixed frames move."""
+    average, body = load_rig(model_folder()), load_body()
+    Ts = average.Ts_root_link.copy()
+    Ts[:, :3, 3] = [points[name] for name in average.link_names]
+    offsets = {}
+    for name in average.extra_offsets:
+        frame = body.model.frames[body.model.getFrameId(name)]
+        link = int(np.flatnonzero(body.link_joints == frame.parentJoint)[0])
+        T = average.Ts_root_link[link]
+        offsets[name] = points[name] - (T[:3, :3] @ frame.placement.translation + T[:3, 3])
+    return Rig(average.link_names, Ts, offsets, average.explained)
 
 
 def dressed(person: Person, rng: np.random.Generator) -> Person:

@@ -26,6 +26,10 @@ class Sensor(Protocol):
         """Rays a pixel along each axis that `measure` wants."""
         ...
 
+    def with_camera(self, camera: PinholeCamera) -> Sensor:
+        """The same sensor with other intrinsics."""
+        ...
+
     def measure(self, view: View, rng: np.random.Generator) -> Float[ndarray, "h w"]:
         """Depth image [m], 0 = no reading, shape (camera.height, camera.width).
 

@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reaching to high, low and far places, and lifting a box from the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+from scipy.ndimage import maximum_filter1d
+
+from synthesis.motions.actions.carrying import (
+    before_belly,
+    carrying_height,
+    hold_box,
+    on_sides,
+)
+from synthesis.motions.actions.frames import (
+    along_z,
+    draw_thing,
+    extent,
+    mix,
+    place_of,
+    pose,
+    through,
+    upright_chest,
+)
+from synthesis.motions.actions.mood import Mood, draw_mood, envelope, pick, spans, toss
+from synthesis.motions.actions.idling import shifting
+from synthesis.motions.curves import minimum_jerk, smooth
+from synthesis.motions.gaze import look_at
+from synthesis.motions.holding import HandPath, frame_path, reach
+from synthesis.motions.measures import Measures, measure
+from synthesis.motions.motion import RATE_HZ, Motion, Script, perform
+from synthesis.motions.performance import Performance, Prop
+from synthesis.motions.placing import floor_pose
+from synthesis.motions.poses import FORWARD, LIFTING, Pose, both, sided, still
+from synthesis.objects.thing import Thing
+from synthesis.people.person import SIDES, Person
+
+STOOP = {
+    "pelvis_drop": 0.20,
+    "pelvis_forward": -0.20,
+    "pelvis_pitch": 52.0,
+    "spine_flexion": 30.0,
+    "chest_flexion": 18.0,
+    "neck_flexion": -8.0,
+}
+"""Down with the back, per unit of depth."""
+CROUCH = {
+    "pelvis_drop": 0.50,
+    "pelvis_forward": -0.22,
+    "pelvis_pitch": 28.0,
+    "spine_flexion": 26.0,
+    "chest_flexion": 16.0,
+    "neck_flexion": -12.0,
+}
+"""Down with the knees, per unit of depth."""
+DEPTHS = np.linspace(0.35, 1.15, 9)
+"""Depths that are tried until the hands reach low enough."""
+KNEES = (1.0, 0.6, 0.3, 0.0)
+"""Shares of the preferred bend of the knees that are tried in turn."""
+COMFORT = 0.93
+"""Share of the straight arm with which somebody lifts from the floor."""
+
+
+def down(depth: float, knees: float) -> dict[str, float]:
+    """Bend down by a depth, with the knees (1), with the back (0), or between."""
+    return {name: depth * (knees * CROUCH[name] + (1.0 - knees) * STOOP[name]) for name in CROUCH}
+
+
+def deep_enough(
+    person: Person, mood: Mood, m: Measures, knees: float, palms: Mapping[str, ndarray]
+) -> dict[str, float]:
+    """The shallowest bend from which both arms reach the palms' places and both feet the floor.
+
+    Args:
+        person: Who.
+        mood: Their posture.
+        m: Their measures.
+        knees: Preferred way of bending, see `down`; less with the knees if it must be.
+        palms: T_world_palm by side.
+
+    Returns:
+        Pelvis and trunk of the bend.
+    """
+    nearest, best = np.inf, down(float(DEPTHS[0]), knees)
+    for share in KNEES:
+        for depth in DEPTHS:
+            bend = down(float(depth), share * knees)
+            channels = {**mood.script(start=bend).keys}
+            for name, values in mood.curves.items():
+                channels[name] = ((0.0, channels.get(name, ((0.0, 0.0),))[0][1] + values[0]),)
+            motion = perform(person, Script(1.0 / RATE_HZ, channels, (), mood.stance))
+            if not stands(person, motion):
+                break
+            far = max(
+                float(np.linalg.norm(T[:3, 3] - _shoulder(person, motion, side)))
+                for side, T in palms.items()
+            )
+            if far < nearest:
+                nearest, best = far, bend
+            if far < COMFORT * (m.arm_m + 0.05):
+                return bend
+    return best
+
+
+def stands(person: Person, motion: Motion) -> bool:
+    """Whether every foot that should stand flat in the first frame does."""
+    flat = [frame_path(person, motion, f"{side}_foot")[0, 2, :3] for side in SIDES]
+    return bool(max(np.abs(row - [0.0, 0.0, 1.0]).max() for row in flat) < 1e-3)
+
+
+def _shoulder(person: Person, motion: Motion, side: str) -> Float[ndarray, " 3"]:
+    """Shoulder's centre in the first frame [m]."""
+    return frame_path(person, motion, f"{side}_upper_arm")[0, :3, 3]
+
+
+def reaching(
+    person: Person, rng: np.random.Generator, duration_s: float, things: Mapping
+) -> Performance:
+    """Reach up, down, ahead and aside with one hand or both; knees, trunk and eyes go along."""
+    m, mood = measure(person), draw_mood(rng, duration_s, glances=0.5)
+    stretches = spans(rng, duration_s, (1.9, 3.4), (0.2, 1.2))
+    sides_of = [SIDES if toss(rng, 0.35) else (pick(rng, *SIDES),) for _ in stretches]
+    poses: dict[str, list[tuple[float, ndarray]]] = {side: [] for side in SIDES}
+    arms: list[tuple[float, Pose]] = []
+    trunk: list[tuple[float, Pose]] = []
+    active: dict[str, list[tuple[float, float]]] = {side: [] for side in SIDES}
+    standing = np.array([0.0, 0.0, m.leg_m + 0.08]) + m.pelvis_chest
+    for (start, end), sides in zip(stretches, sides_of, strict=True):
+        where = pick(rng, "high", "high", "ahead", "aside", "low")
+        one = 1.0 if sides[0] == "l" else -1.0
+        yaw = one * np.radians(rng.uniform(-30.0, 100.0 if where == "aside" else 50.0))
+        if len(sides) == 2:
+            yaw *= 0.4
+        pitch = {"high": (30.0, 75.0), "ahead": (-15.0, 20.0), "aside": (-20.0, 40.0),
+                 "low": (-75.0, -45.0)}[where]  # fmt: skip
+        up = np.radians(rng.uniform(*pitch))
+        far = rng.uniform(0.85, 1.25) if where != "low" else rng.uniform(1.3, 1.75)
+        way = np.array([np.cos(yaw) * np.cos(up), np.sin(yaw) * np.cos(up), np.sin(up)])
+        lean = _lean(rng, where, float(np.degrees(yaw)), far)
+        middle = standing + [0.0, 0.0, m.shoulder[2]] + far * (m.arm_m + 0.07) * way
+        middle[2] = max(middle[2], 0.25)
+        ease = min(0.9 / mood.tempo, 0.42 * (end - start))
+        trunk += [(start, still(lean)), (start + ease, lean)]
+        trunk += [(end - ease, lean), (end, still(lean))]
+        for side in sides:
+            outward = 1.0 if side == "l" else -1.0
+            aside = m.shoulder[1] * outward if len(sides) == 2 else 0.5 * m.shoulder[1] * outward
+            across = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+            facing = -outward * across + np.array([0.0, 0.0, rng.uniform(-1.2, 0.4)])
+            T = pose(facing - (facing @ way) * way, -way, middle + aside * across)
+            poses[side].append((0.5 * (start + end), T))
+            active[side].append((start, end))
+            hanging = {f"{side}_{name}": mood.hang[f"{side}_{name}"] for name in FORWARD}
+            arms += [(start, hanging), (start + ease, sided(side, FORWARD))]
+            arms += [(end - ease, sided(side, FORWARD)), (end, hanging)]
+    timed = sorted(trunk + arms, key=lambda pair: pair[0])
+    motion = perform(person, mood.script(*timed))
+    paths, look = [], np.zeros(len(mood.times_s))
+    place = np.zeros((len(mood.times_s), 3))
+    for side in SIDES:
+        if not poses[side]:
+            continue
+        goal = through(poses[side], mood.times_s)
+        share = envelope(mood.times_s, active[side], 0.95 / mood.tempo)
+        paths.append(HandPath(side, goal, share, (0.4, 0.4, 0.4)))
+        place += share[:, None] * goal[:, :3, 3]
+        look += share
+    motion = reach(person, motion, paths)
+    place = place / np.maximum(look, 1e-3)[:, None] + (look < 1e-3)[:, None] * [2.0, 0.0, 1.5]
+    return Performance("reaching", look_at(person, motion, place, 0.8 * np.minimum(look, 1.0)))
+
+
+def _lean(rng: np.random.Generator, where: str, yaw_deg: float, far: float) -> dict[str, float]:
+    """Trunk and knees that go along with a reach."""
+    over = np.clip(far - 0.8, 0.0, 1.0)
+    out = {
+        "chest_rotation": float(np.clip(0.28 * yaw_deg, -25.0, 25.0)),
+        "spine_rotation": float(np.clip(0.14 * yaw_deg, -12.0, 12.0)),
+        "pelvis_yaw": float(np.clip(0.15 * yaw_deg, -12.0, 12.0)),
+        "pelvis_drop": 0.0,
+        "pelvis_forward": 0.04 * over,
+        "pelvis_pitch": 12.0 * over,
+        "spine_flexion": 12.0 * over,
+        "chest_flexion": 5.0 * over,
+    }
+    if where == "high":
+        out |= {"pelvis_pitch": 0.0, "spine_flexion": -4.0, "chest_flexion": -8.0}
+        tiptoe = rng.uniform(8.0, 24.0) if toss(rng, 0.4) else 0.0
+        out |= {"l_heel": tiptoe, "r_heel": tiptoe, "pelvis_drop": -0.0025 * tiptoe}
+        out["pelvis_forward"] = 0.02 + 0.003 * tiptoe
+    if where == "low":
+        out |= down(rng.uniform(0.45, 0.85), rng.uniform(0.0, 1.0))
+    return out
+
+
+def bending_and_lifting(
+    person: Person, rng: np.random.Generator, duration_s: float, things: Mapping
+) -> Performance:
+    """Pick a box up from the floor, hold it, and put it down again."""
+    m, mood = measure(person), draw_mood(rng, duration_s, glances=0.3, slouch=0.6)
+    mood = mood.standing(narrower_m=float(rng.uniform(-0.12, -0.02)))
+    thing = draw_thing(things, "box", rng)
+    tempo = mood.tempo * max(1.0, 4.0 / duration_s)
+    t = float(rng.uniform(0.1, 0.5))
+    ahead = 0.22 + 0.5 * extent(thing)[0] + rng.uniform(0.0, 0.08)
+    T_floor = floor_pose(ahead, float(rng.normal(0.0, 0.03)), float(rng.normal(0.0, 0.08)))
+    palms = {side: T[0] for side, T in on_sides(T_floor[None], thing).items()}
+    bend = deep_enough(person, mood, m, float(rng.uniform(0.2, 1.0)), palms)
+    down_s, up_s = rng.uniform(1.1, 1.5) / tempo, rng.uniform(1.2, 1.7) / tempo
+    grab_s, put_s = 0.25 / tempo, 0.25 / tempo
+    timed: list[tuple[float, Pose]] = []
+    lifts: list[tuple[float, float]] = []
+    hands: list[tuple[float, float]] = []
+    hanging = {name: mood.hang[name] for name in both(LIFTING)}
+    while True:
+        takes = t + down_s
+        up = takes + grab_s + up_s
+        back = up + rng.uniform(0.4, 2.0)
+        sets = back + up_s
+        rises = sets + put_s + down_s
+        keeps = rises > duration_s
+        timed += [(t, still(bend) | hanging), (takes, bend | both(LIFTING))]
+        timed += [(takes + grab_s, bend), (up, still(bend))]
+        lifts.append((takes + 0.7 * grab_s, duration_s + 1.0 if keeps else sets + 0.3 * put_s))
+        hands.append((t + 0.2 * down_s, duration_s + down_s if keeps else rises - 0.2 * down_s))
+        if keeps:
+            break
+        timed += [(back, still(bend)), (sets, bend | both(LIFTING)), (sets + put_s, bend)]
+        timed += [(rises, still(bend) | hanging)]
+        t = rises + rng.uniform(0.2, 0.9)
+        if t + down_s + grab_s + up_s + 0.3 > duration_s:
+            break
+    motion = perform(person, mood.script(*timed))
+    times_s = motion.times_s
+    chest = upright_chest(person, motion, 0.1)
+    held = before_belly(m, thing, carrying_height(m, thing, rng))
+    Ts, off_floor = _lifted(chest, T_floor, held, lifts, times_s)
+    Ts[:, :3, 3] += off_floor[:, None] * _into_reach(person, motion, m, Ts, thing)
+    Ts[:, 2, 3] = np.maximum(Ts[:, 2, 3], 0.0)
+    share = envelope(times_s, hands, 0.75 * down_s)
+    motion = hold_box(person, motion, Ts, thing, share)
+    looks = envelope(times_s, hands, 0.5)
+    motion = look_at(person, motion, Ts[:, :3, 3] + [0.0, 0.0, 0.2], 0.5 * looks)
+    return Performance("bending_and_lifting", motion, (Prop(thing, Ts, held=True),))
+
+
+def _lifted(
+    chest: Float[ndarray, "n 4 4"],
+    T_floor: Float[ndarray, "4 4"],
+    T_chest_held: Float[ndarray, "4 4"],
+    lifts: list[tuple[float, float]],
+    times_s: Float[ndarray, " n"],
+) -> tuple[Float[ndarray, "n 4 4"], Float[ndarray, " n"]]:
+    """A box that goes with the chest while it is held, and comes to the belly as the chest rises.
+
+    Args:
+        chest: Upright frames of the chest.
+        T_floor: Where the box stands.
+        T_chest_held: Where it is carried.
+        lifts: From when the hands have the box until they set it down [s].
+        times_s: Time of each frame [s], shape (N,).
+
+    Returns:
+        T_world_box (N, 4, 4), and 0 where the box stands to 1 where it is well off the floor (N,).
+    """
+    Ts, off = np.tile(T_floor, (len(times_s), 1, 1)), np.zeros(len(times_s))
+    for start, end in lifts:
+        inside = np.flatnonzero((times_s >= start) & (times_s <= end))
+        if len(inside) < 2:
+            continue
+        z = chest[inside, 2, 3]
+        top = inside[int(z.argmax())]
+        down_again = inside[-1] < len(times_s) - 1
+        for part, at in ((inside[inside <= top], inside[0]), (inside[inside > top], inside[-1])):
+            if len(part) == 0:
+                continue
+            rise = chest[top, 2, 3] - chest[at, 2, 3]
+            share = np.clip((chest[part, 2, 3] - chest[at, 2, 3]) / max(rise, 0.05), 0.0, 1.0)
+            if at == inside[-1] and not down_again:
+                share = np.ones(len(part))
+            T_near = np.linalg.inv(chest[at]) @ T_floor
+            count = (len(part), 1, 1)
+            relative = mix(np.tile(T_near, count), np.tile(T_chest_held, count), share)
+            Ts[part] = chest[part] @ relative
+            off[part] = minimum_jerk(8.0 * share)
+    return Ts, off
+
+
+def _into_reach(
+    person: Person,
+    motion: Motion,
+    m: Measures,
+    Ts_world_box: Float[ndarray, "n 4 4"],
+    thing: Thing,
+) -> Float[ndarray, "n 3"]:
+    """How far a box must come towards the shoulders so that both arms reach it [m]."""
+    shift = np.zeros((len(Ts_world_box), 3))
+    for side, palms in on_sides(Ts_world_box, thing).items():
+        shoulder = frame_path(person, motion, f"{side}_upper_arm")[:, :3, 3]
+        way = shoulder - palms[:, :3, 3]
+        far = np.linalg.norm(way, axis=1)
+        excess = np.maximum(far - COMFORT * (m.arm_m + 0.05), 0.0)
+        wide = smooth(maximum_filter1d(excess, 5, mode="nearest"), RATE_HZ, 0.06)
+        shift += 0.7 * (wide / far)[:, None] * way
+    return shift
