@@ -16,7 +16,7 @@ from kintrack.raster import rasterise
 from synthesis.motions.motion import RATE_HZ
 from synthesis.people.figure import move
 from synthesis.render.stage import Stage
-from synthesis.render.view import View
+from synthesis.render.view import View, pixel_radiance
 from synthesis.scene import Scene
 from synthesis.sensors.sensor import rays
 
@@ -75,18 +75,13 @@ def film(scene: Scene, rng: np.random.Generator) -> Iterator[Exposure]:
             depth_m=scene.sensor.measure(view, rng),
             true_depth_m=view.depth_m[::k, ::k],
             labels=view.labels[::k, ::k],
-            color=None if scene.color is None else scene.color.develop(_mean(view, k), rng),
+            color=None
+            if scene.color is None
+            else scene.color.develop(pixel_radiance(view, k), rng),
             joint_positions_camera_m=joints,
             hidden_share=_hidden_share(view, transform_points(invert_rigid(T), skin), faces),
             hidden_joints=_hidden_joints(view, joints),
         )
-
-
-def _mean(view: View, k: int) -> Float[ndarray, "h w 3"]:
-    """Radiance of the image's pixels: the mean of their samples."""
-    assert view.color is not None
-    height, width, _ = view.color.shape
-    return view.color.reshape(height // k, k, width // k, k, 3).mean(axis=(1, 3))
 
 
 def _hidden_share(view: View, skin_camera: Float[ndarray, "v 3"], faces) -> float:

@@ -21,7 +21,7 @@ from synthesis.sensors.catalogue import SENSORS
 from synthesis.takes import Take
 
 MANIFEST = "dataset.json"
-BYTES_PER_PIXEL = 1.9
+BYTES_PER_PIXEL = 1.3
 """Depth, colour and labels of a frame on disk, measured on whole rooms [bytes/px]."""
 MARGIN = 1.1
 """How much more than estimated must be free."""

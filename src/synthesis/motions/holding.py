@@ -53,6 +53,8 @@ RETURNING = 20.0
 """How much more the scripted posture counts when the palm has let go."""
 FURTHEST = 0.985
 """Longest way from shoulder to wrist, as a share of the straight arm."""
+FIRST_ROUNDS = 6
+"""How often as many in the first frame, which no frame before it prepares."""
 CONVERGED_RAD = 1e-5
 """Largest step that ends the iteration [rad]."""
 
@@ -146,10 +148,11 @@ def reach(person: Person, motion: Motion, paths: Sequence[HandPath]) -> Motion:
             if path.share[n] > 1e-9:
                 scripted = motion.q[n, arm.dofs + 1]
                 goal = pin.SE3(path.Ts_world_palm[n])
-                q[n, arm.dofs + 1] = _solve(
-                    arm, q[n], scripted, offset, steady, goal, path.turn, path.share[n]
-                )
-                offset = q[n, arm.dofs + 1] - scripted
+                for _ in range(FIRST_ROUNDS if np.isinf(steady) else 1):
+                    q[n, arm.dofs + 1] = _solve(
+                        arm, q[n], scripted, offset, steady, goal, path.turn, path.share[n]
+                    )
+                    offset = q[n, arm.dofs + 1] - scripted
             steady = STEADY_RAD
     return replace(motion, q=q)
 
@@ -233,7 +236,11 @@ def _solve(
         before = q[arm.dofs + 1].copy()
         pull = posture * (scripted - before) + (start - before) / steady_rad**2
         H = J.T @ J + clear_J.T @ clear_J + np.diag(posture + 1.0 / steady_rad**2)
-        step = np.linalg.solve(H, J.T @ r + clear_J.T @ clear_r + pull)
+        slope = J.T @ r + clear_J.T @ clear_r + pull
+        at_limit = ((before <= lower) & (slope < 0.0)) | ((before >= upper) & (slope > 0.0))
+        free = np.flatnonzero(~at_limit)
+        step = np.zeros(len(slope))
+        step[free] = np.linalg.solve(H[np.ix_(free, free)], slope[free])
         q[arm.dofs + 1] = np.clip(before + np.clip(step, -0.3, 0.3), lower, upper)
         if np.abs(q[arm.dofs + 1] - before).max() < CONVERGED_RAD:
             break

@@ -50,9 +50,15 @@ def place(at: ArrayLike, y: ArrayLike, z: ArrayLike) -> Float[ndarray, "4 4"]:
     return T
 
 
+SAME_PLACE_M = 1e-6
+"""Points of a path nearer than this are one [m]."""
+
+
 def bent(points: ArrayLike, radius: float, steps: int = 4) -> ndarray:
     """A path whose corners are rounded by parabolas that start `radius` before each [m]."""
     knots = np.asarray(points, dtype=float)
+    apart = np.linalg.norm(np.diff(knots, axis=0), axis=1) > SAME_PLACE_M
+    knots = knots[np.concatenate([[True], apart])]
     path = [knots[0]]
     for before, corner, after in zip(knots[:-2], knots[1:-1], knots[2:], strict=True):
         a, b = before - corner, after - corner

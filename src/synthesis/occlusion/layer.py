@@ -13,7 +13,7 @@ from kintrack.sequence.frame import Frame
 from synthesis.mesh import Mesh
 from synthesis.render.lights import draw_lights
 from synthesis.render.stage import Stage
-from synthesis.render.view import View
+from synthesis.render.view import View, pixel_radiance
 from synthesis.sensors.color import ColorCamera, draw_color_camera
 from synthesis.sensors.sensor import Sensor, rays
 
@@ -91,11 +91,8 @@ def composite(frame: Frame, inserted: Layer, rng: np.random.Generator) -> Compos
 
 
 def _color(inserted: Layer, rng: np.random.Generator) -> UInt8[ndarray, "h w 3"]:
-    k = inserted.sensor.supersampling
-    assert inserted.view.color is not None
-    height, width, _ = inserted.view.color.shape
-    mean = inserted.view.color.reshape(height // k, k, width // k, k, 3).mean(axis=(1, 3))
-    return inserted.color_camera.develop(mean, rng)
+    radiance = pixel_radiance(inserted.view, inserted.sensor.supersampling)
+    return inserted.color_camera.develop(radiance, rng)
 
 
 def _without(

@@ -10,7 +10,7 @@ precision. Closed meshes let no rays through, but for those exactly at a vertex,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -57,8 +57,7 @@ class Hits:
 
     def chosen(self, keep: Bool[ndarray, " m"]) -> Hits:
         """Some of them."""
-        parts = (self.ray, self.face, self.weights, self.depth_m, self.normal, self.cosine)
-        return Hits(*(part[keep] for part in parts))
+        return Hits(*(getattr(self, field.name)[keep] for field in fields(self)))
 
 
 class Caster:
@@ -96,9 +95,8 @@ class Caster:
             chosen: Which of them to cast, ascending; all if None.
         """
         directions = rays.directions if chosen is None else rays.directions[chosen]
-        ends = np.empty((len(directions), 3), dtype=np.float32)
-        ends[:] = rays.origin
-        found = self._scene.run(ends, directions.astype(np.float32), output=1)
+        origins = np.tile(rays.origin.astype(np.float32), (len(directions), 1))
+        found = self._scene.run(origins, directions.astype(np.float32), output=1)
         row = np.flatnonzero(found["primID"] >= 0)
         ray = row if chosen is None else chosen[row]
         found = tuple(found[name] for name in ("primID", "u", "v", "tfar"))

@@ -27,3 +27,13 @@ class View:
     """Body part seen, 0 = background."""
     color: Float[ndarray, "h w 3"] | None = None
     """Linear red, green, blue radiance (1 = white paper in full light); None if not asked for."""
+
+
+def pixel_radiance(view: View, supersampling: int) -> Float[ndarray, "h w 3"]:
+    """Radiance of an image's pixels: the mean of their k x k rays, shape (height, width, 3)."""
+    assert view.color is not None
+    k = supersampling
+    if k == 1:
+        return view.color
+    height, width, _ = view.color.shape
+    return view.color.reshape(height // k, k, width // k, k, 3).mean(axis=(1, 3))

@@ -23,7 +23,7 @@ def upright_chest(
 ) -> Float[ndarray, "n 4 4"]:
     """Frames at the chest's origin, z up, x where the chest looks, smoothed; shape (N, 4, 4)."""
     chest = frame_path(person, motion, "chest")
-    yaw = np.unwrap(np.arctan2(chest[:, 1, 0], chest[:, 0, 0]))
+    yaw = np.unwrap(np.arctan2(-chest[:, 0, 1], chest[:, 1, 1]))
     return along_z(smooth(chest[:, :3, 3], RATE_HZ, smooth_s), smooth(yaw, RATE_HZ, smooth_s))
 
 

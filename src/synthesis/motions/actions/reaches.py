@@ -28,14 +28,16 @@ from synthesis.motions.actions.frames import (
 )
 from synthesis.motions.actions.mood import Mood, draw_mood, envelope, pick, spans, toss
 from synthesis.motions.actions.idling import shifting
+from synthesis.motions.arms import arm
 from synthesis.motions.curves import minimum_jerk, smooth
 from synthesis.motions.gaze import look_at
 from synthesis.motions.holding import HandPath, frame_path, reach
+from synthesis.motions.legs import LEG_HINGES
 from synthesis.motions.measures import Measures, measure
 from synthesis.motions.motion import RATE_HZ, Motion, Script, perform
 from synthesis.motions.performance import Performance, Prop
 from synthesis.motions.placing import floor_pose
-from synthesis.motions.poses import FORWARD, LIFTING, Pose, both, sided, still
+from synthesis.motions.poses import CARRYING, FORWARD, Pose, both, sided, still
 from synthesis.objects.thing import Thing
 from synthesis.people.person import SIDES, Person
 
@@ -61,7 +63,13 @@ DEPTHS = np.linspace(0.35, 1.15, 9)
 """Depths that are tried until the hands reach low enough."""
 KNEES = (1.0, 0.6, 0.3, 0.0)
 """Shares of the preferred bend of the knees that are tried in turn."""
-COMFORT = 0.93
+SPARE_RAD = 0.03
+"""How far inside their limits the legs' hinges stay in a bend [rad]."""
+BOXES = 8
+"""How many boxes are drawn until one can be reached where it stands."""
+FOOT_M = 0.03
+"""Lowest part of a box, by which it stands before the toes [m]."""
+COMFORT = 0.91
 """Share of the straight arm with which somebody lifts from the floor."""
 
 
@@ -72,7 +80,7 @@ def down(depth: float, knees: float) -> dict[str, float]:
 
 def deep_enough(
     person: Person, mood: Mood, m: Measures, knees: float, palms: Mapping[str, ndarray]
-) -> dict[str, float]:
+) -> tuple[dict[str, float], bool]:
     """The shallowest bend from which both arms reach the palms' places and both feet the floor.
 
     Args:
@@ -83,7 +91,7 @@ def deep_enough(
         palms: T_world_palm by side.
 
     Returns:
-        Pelvis and trunk of the bend.
+        Pelvis and trunk of the bend, and whether the arms reach.
     """
     nearest, best = np.inf, down(float(DEPTHS[0]), knees)
     for share in KNEES:
@@ -102,12 +110,16 @@ def deep_enough(
             if far < nearest:
                 nearest, best = far, bend
             if far < COMFORT * (m.arm_m + 0.05):
-                return bend
-    return best
+                return bend, True
+    return best, False
 
 
 def stands(person: Person, motion: Motion) -> bool:
-    """Whether every foot that should stand flat in the first frame does."""
+    """Whether both feet stand flat in the first frame, with some room in every hinge."""
+    legs = [person.body.dof(f"{s}_{hinge}") for s in SIDES for hinge in LEG_HINGES]
+    angles, lower, upper = motion.q[0, np.array(legs) + 1], person.body.lower, person.body.upper
+    if min((angles - lower[legs]).min(), (upper[legs] - angles).min()) < SPARE_RAD:
+        return False
     flat = [frame_path(person, motion, f"{side}_foot")[0, 2, :3] for side in SIDES]
     return bool(max(np.abs(row - [0.0, 0.0, 1.0]).max() for row in flat) < 1e-3)
 
@@ -203,19 +215,25 @@ def bending_and_lifting(
     """Pick a box up from the floor, hold it, and put it down again."""
     m, mood = measure(person), draw_mood(rng, duration_s, glances=0.3, slouch=0.6)
     mood = mood.standing(narrower_m=float(rng.uniform(-0.12, -0.02)))
-    thing = draw_thing(things, "box", rng)
     tempo = mood.tempo * max(1.0, 4.0 / duration_s)
     t = float(rng.uniform(0.1, 0.5))
-    ahead = 0.22 + 0.5 * extent(thing)[0] + rng.uniform(0.0, 0.08)
-    T_floor = floor_pose(ahead, float(rng.normal(0.0, 0.03)), float(rng.normal(0.0, 0.08)))
-    palms = {side: T[0] for side, T in on_sides(T_floor[None], thing).items()}
-    bend = deep_enough(person, mood, m, float(rng.uniform(0.2, 1.0)), palms)
+    for _ in range(BOXES):
+        thing = draw_thing(things, "box", rng)
+        foot = thing.mesh.vertices[thing.mesh.vertices[:, 2] < FOOT_M, 0]
+        ahead = rng.uniform(0.20, 0.26) - float(foot.min())
+        aside, turned = float(rng.normal(0.0, 0.03)), float(rng.normal(0.0, 0.08))
+        T_floor = floor_pose(ahead, aside, turned)
+        palms = {side: T[0] for side, T in on_sides(T_floor[None], thing).items()}
+        bend, reached = deep_enough(person, mood, m, float(rng.uniform(0.2, 1.0)), palms)
+        if reached:
+            break
     down_s, up_s = rng.uniform(1.1, 1.5) / tempo, rng.uniform(1.2, 1.7) / tempo
     grab_s, put_s = 0.25 / tempo, 0.25 / tempo
     timed: list[tuple[float, Pose]] = []
     lifts: list[tuple[float, float]] = []
     hands: list[tuple[float, float]] = []
-    hanging = {name: mood.hang[name] for name in both(LIFTING)}
+    reaching_down = both(_dangling(bend))
+    hanging = {name: mood.hang[name] for name in reaching_down}
     while True:
         takes = t + down_s
         up = takes + grab_s + up_s
@@ -223,13 +241,14 @@ def bending_and_lifting(
         sets = back + up_s
         rises = sets + put_s + down_s
         keeps = rises > duration_s
-        timed += [(t, still(bend) | hanging), (takes, bend | both(LIFTING))]
-        timed += [(takes + grab_s, bend), (up, still(bend))]
+        timed += [(t, still(bend) | hanging), (takes, bend | reaching_down)]
+        timed += [(takes + grab_s, bend | reaching_down), (up, still(bend) | both(CARRYING))]
         lifts.append((takes + 0.7 * grab_s, duration_s + 1.0 if keeps else sets + 0.3 * put_s))
         hands.append((t + 0.2 * down_s, duration_s + down_s if keeps else rises - 0.2 * down_s))
         if keeps:
             break
-        timed += [(back, still(bend)), (sets, bend | both(LIFTING)), (sets + put_s, bend)]
+        timed += [(back, still(bend) | both(CARRYING)), (sets, bend | reaching_down)]
+        timed += [(sets + put_s, bend | reaching_down)]
         timed += [(rises, still(bend) | hanging)]
         t = rises + rng.uniform(0.2, 0.9)
         if t + down_s + grab_s + up_s + 0.3 > duration_s:
@@ -246,6 +265,17 @@ def bending_and_lifting(
     looks = envelope(times_s, hands, 0.5)
     motion = look_at(person, motion, Ts[:, :3, 3] + [0.0, 0.0, 0.2], 0.5 * looks)
     return Performance("bending_and_lifting", motion, (Prop(thing, Ts, held=True),))
+
+
+def _dangling(bend: Pose) -> Pose:
+    """An arm that points down and a little forward from a trunk that is bent."""
+    lean = np.radians(bend["pelvis_pitch"] + bend["spine_flexion"] + bend["chest_flexion"])
+    c, s = np.cos(lean), np.sin(lean)
+    upper, lower = (0.15, -1.0), (0.45, -1.0)
+    return arm(
+        upper=(c * upper[0] - s * upper[1], 0.22, s * upper[0] + c * upper[1]),
+        forearm=(c * lower[0] - s * lower[1], 0.05, s * lower[0] + c * lower[1]),
+    )
 
 
 def _lifted(

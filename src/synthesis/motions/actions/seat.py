@@ -29,8 +29,10 @@ SEAT_REACH_M = (-0.22, 0.20)
 """Part of a seat before and behind the pelvis that carries somebody [m]."""
 ROUNDS = 6
 """Corrections of the pelvis' height."""
-CLEAR_M = 0.05
-"""Gap between the back of the pelvis and a backrest's foot [m]."""
+EXACT_M = 0.002
+"""How exactly the pelvis' height is found [m]; a leg too short for that is put nearer."""
+NEAREST = 0.25
+"""Least distance from the feet back to the pelvis [leg lengths]."""
 
 
 @dataclass(frozen=True)
@@ -86,12 +88,15 @@ def draw_seated(person: Person, rng: np.random.Generator, mood: Mood, things: Ma
         toe_out_deg=(float(rng.uniform(0.0, 20.0)), float(rng.uniform(0.0, 20.0))),
         left_ahead_m=float(rng.normal(0.0, 0.05)),
     )
-    lowest = 0.0
-    for _ in range(ROUNDS):
-        script = Script(1.0 / RATE_HZ, {k: ((0.0, v),) for k, v in seated.items()}, (), stance)
-        q = perform(person, script).q[0]
-        lowest = buttocks(person, q, q[:2], 0.0)
-        seated["pelvis_drop"] += (lowest - height + PRESSED_M) / leg_m
+    while True:
+        for _ in range(ROUNDS):
+            script = Script(1.0 / RATE_HZ, {k: ((0.0, v),) for k, v in seated.items()}, (), stance)
+            q = perform(person, script).q[0]
+            error = buttocks(person, q, q[:2], 0.0) - height + PRESSED_M
+            seated["pelvis_drop"] += error / leg_m
+        if abs(error) < EXACT_M or seated["pelvis_forward"] > -NEAREST:
+            break
+        seated["pelvis_forward"] += 0.04
     back = float(q[0])
     T = np.eye(4)
     T[:2, 3] = back + rng.uniform(0.03, 0.10), rng.normal(0.0, 0.015)

@@ -15,7 +15,7 @@ from synthesis.motions.poses import Pose
 from synthesis.motions.stepping import steps_turning
 from synthesis.people.person import Person
 
-FULL_TURN_STEP_DEG = (45.0, 80.0)
+FULL_TURN_STEP_DEG = (42.0, 70.0)
 """Smallest and largest turn of a pair of steps [deg]."""
 
 
@@ -25,7 +25,9 @@ def turning_away(
     """Turn by steps on the spot; the head goes first, arms swing a little, the back stays shown."""
     mood = draw_mood(rng, duration_s, glances=0.6)
     mood = mood.standing(
-        narrower_m=float(rng.uniform(-0.04, 0.03)), left_ahead_m=float(rng.normal(0.0, 0.02))
+        narrower_m=float(rng.uniform(-0.04, 0.03)),
+        toe_out_deg=(float(rng.uniform(0.0, 12.0)), float(rng.uniform(0.0, 12.0))),
+        left_ahead_m=float(rng.normal(0.0, 0.02)),
     )
     t, yaw = float(rng.uniform(0.2, 0.8)), 0.0
     steps: tuple[Step, ...] = ()

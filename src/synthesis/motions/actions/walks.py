@@ -140,7 +140,11 @@ def draw_walk(
         The walk.
     """
     mood = draw_mood(rng, duration_s, glances=glances, slouch=0.8)
-    mood = mood.standing(narrower_m=float(rng.uniform(0.0, 0.045)), left_ahead_m=0.0)
+    mood = mood.standing(
+        narrower_m=float(rng.uniform(0.0, 0.045)),
+        toe_out_deg=(float(rng.uniform(2.0, 14.0)), float(rng.uniform(2.0, 14.0))),
+        left_ahead_m=0.0,
+    )
     kind = pick(rng, *PATHS) if kind is None else kind
     brisk = rng.uniform(*speed)
     length = leg_length(person) * rng.uniform(0.68, 0.84) * brisk**0.5
@@ -175,7 +179,7 @@ def draw_walk(
         steps += steps_along(person, path, t, length, step_s, mood.stance, side, degrees)
         place, heading, t = path[-1], end, steps[-1].end_s + rng.uniform(0.2, 0.8)
         about = np.pi * (1.0 if toss(rng) else -1.0) + rng.normal(0.0, 0.25)
-        pivot_s, parts = step_s * rng.uniform(0.75, 0.95), rng.uniform(62.0, 95.0)
+        pivot_s, parts = step_s * rng.uniform(0.75, 0.95), rng.uniform(58.0, 72.0)
         turning = steps_turning(
             person, np.degrees(heading), np.degrees(heading + about), t, pivot_s, parts,
             mood.stance, (float(place[0]), float(place[1])),
