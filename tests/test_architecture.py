@@ -23,6 +23,7 @@ ROWS = (
     ("alignment",),
     ("judge",),
     ("start",),
+    ("begin",),
     ("result",),
     ("tracker",),
     ("metrics", "evaluate"),
@@ -46,6 +47,7 @@ HEAVY = {
     "synthesis/people/build.py": {"torch", "anny"},
     "synthesis/objects/files.py": {"trimesh", "PIL"},
     "synthesis/render/": {"embreex"},
+    "segmentation/": {"torch", "openvino"},
 }
 """Who may import which of the packages that not everybody has."""
 ALL_HEAVY = {"torch", "anny", "pymeshlab", "trimesh", "embreex", "skimage", "PIL", "openvino"}

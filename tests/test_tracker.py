@@ -10,6 +10,7 @@ from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_poin
 from kintrack.joints import JOINT_NAMES
 from kintrack.raster import rasterise
 from kintrack.skin import skinned_vertices
+from kintrack.start import start
 from kintrack.tracker import Tracker
 
 LEFT_ARM = [JOINT_NAMES.index(f"l_{name}") for name in ("elbow", "wrist", "hand")]
@@ -223,3 +224,27 @@ def test_a_rejected_start_leaves_the_body_as_it_was(scene):
     tracker = Tracker()
     assert tracker.step(scene.frame(depth)).status == "initialising"
     assert len(tracker.human.shape) == 0
+
+
+def test_after_a_rejected_start_the_next_attempt_waits(scene, monkeypatch):
+    depth = np.zeros((scene.camera.height, scene.camera.width), dtype=np.float32)
+    depth[60:200, 110:210] = 2.5
+    attempts = []
+    monkeypatch.setattr(
+        "kintrack.tracker.start", lambda *given: attempts.append(0) or start(*given)
+    )
+    tracker = Tracker()
+    times = [0.0, 0.1, 0.4, 0.6, 0.7]
+    frames = [replace(scene.frame(depth, n), timestamp_s=t) for n, t in enumerate(times)]
+    counts = []
+    for frame in frames:
+        assert tracker.step(frame).status == "initialising"
+        counts.append(len(attempts))
+    assert counts == [1, 1, 1, 2, 2]
+
+
+def test_nobody_in_view_does_not_delay_the_start(scene, quick):
+    tracker = Tracker(quick)
+    assert tracker.step(scene.room(0)).status == "initialising"
+    found = tracker.step(scene.frame(scene.depth(scene.place(), wall_m=4.5), 1))
+    assert found.status == "tracking"

@@ -182,6 +182,8 @@ class StartConfig:
     """Leading shape coefficients (stature, build, sex) sized at the start; 0 for none."""
     shape_limit: float = 2.5
     """Largest shape coefficient [standard deviations]."""
+    retry_s: float = 0.5
+    """After a person-sized blob could not be fitted, the next attempt comes this much later [s]."""
 
     def __post_init__(self) -> None:
         check_bounds(
@@ -192,6 +194,7 @@ class StartConfig:
             rounds=(1, 200),
             shape_coefficients=(0, 10),
             shape_limit=(0, 5),
+            retry_s=(0, 60),
         )
         if self.min_height_m >= self.max_height_m:
             raise ConfigError(

@@ -49,6 +49,7 @@ def fit_sequence(
     viewer: Viewer | None = None,
     T_world_camera: Float[ndarray, "4 4"] = T_LEVEL_WORLD_CAMERA,
     on_frame: Callable[[Frame, FrameResult], None] = lambda frame, result: None,
+    begun: tuple[Frame, Float[ndarray, "j 3"]] | None = None,
 ) -> Track:
     """Track a recording into a result folder that is valid at every moment.
 
@@ -60,6 +61,8 @@ def fit_sequence(
         viewer: Shown every frame, if given.
         T_world_camera: Camera pose; a level camera if not given.
         on_frame: Called after every frame, for progress.
+        begun: A frame, and the joints in it as far as they are known (`Tracker.begin`), with which
+            the tracker starts before the first frame; it starts by itself if None.
 
     Returns:
         The track; also written when an exception or Ctrl-C ends the loop.
@@ -73,6 +76,8 @@ def fit_sequence(
         if path is not None:
             make_result_folder(path.parent)
     tracker = Tracker(config, T_world_camera=T_world_camera)
+    if begun is not None:
+        tracker.begin(*begun)
     facts = asdict(tracker.config)
     with ExitStack() as stack:
         writer = stack.enter_context(

@@ -15,6 +15,7 @@ from threadpoolctl import ThreadpoolController
 from kintrack.alignment import Fit, View, fit_pose, view_skin
 from kintrack.association.observation import Observation, observe, within
 from kintrack.association.window import associate
+from kintrack.begin import begin
 from kintrack.body import BodyState, joint_jacobians, run_kinematics
 from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
@@ -26,7 +27,7 @@ from kintrack.residuals.prior import TangentPrior, diagonal_prior, gaussian_prio
 from kintrack.result import FrameResult
 from kintrack.sequence.frame import Frame
 from kintrack.solver.gauss_newton import normal_equations
-from kintrack.start import sized, start
+from kintrack.start import Start, sized, start
 
 NONE = np.zeros(0, dtype=np.int64)
 UNSEEN_SHARE = 0.08
@@ -70,6 +71,7 @@ class Tracker:
         self.config = TrackerConfig() if config is None else config
         self.T_world_camera = T_world_camera
         self.belief: Belief | None = None
+        self._failed_s = -np.inf
         self._clock = clock
         self._threads = ThreadpoolController()
         self._meet(load_human() if human is None else human)
@@ -91,6 +93,35 @@ class Tracker:
         """
         with self._threads.limit(limits=1, user_api="blas"):
             return self._step(frame)
+
+    def begin(self, frame: Frame, joints_camera: Float[ndarray, "j 3"]) -> FrameResult:
+        """Start from joints that somebody else has found roughly, whatever the fit says of them.
+
+        Args:
+            frame: A frame that shows the person.
+            joints_camera: Joint centres [m], order of `JOINT_NAMES`, camera frame; NaN for unknown
+                ones, but hips and shoulders are needed.
+
+        Returns:
+            Pose, joints, covariances and status.
+
+        Raises:
+            ConfigError: if a joint that is needed is missing.
+        """
+        began = time.perf_counter()
+        if frame.problem is not None or frame.depth_m is None:
+            return self._nothing(frame, "skipped", began, frame.problem or "no depth")
+        with self._threads.limit(limits=1, user_api="blas"):
+            a = self.config.association
+            observation = observe(frame, a.max_width_px, a.background_share)
+            try:
+                found = begin(
+                    self.human, observation, joints_camera, self.T_world_camera, self.config
+                )
+            except AssociationError:
+                return self._nothing(frame, "initialising", began)
+            person, sized_start = self._sized(found)
+            return self._meet_at(frame, person, sized_start or found, began)
 
     def _step(self, frame: Frame) -> FrameResult:
         began = time.perf_counter()
@@ -129,19 +160,32 @@ class Tracker:
     def _start(self, frame: Frame, observation: Observation, began: float) -> FrameResult:
         """First frame, or the first after a loss: find the person and fit from several guesses."""
         config, person = self.config, self.human
+        if 0.0 <= frame.timestamp_s - self._failed_s < config.start.retry_s:
+            return self._nothing(frame, "initialising", began)
         found = start(person, observation, self.T_world_camera, config)
-        if found is not None and len(person.shape) == 0 and config.start.shape_coefficients:
-            try:
-                person, found = sized(person, found, self.T_world_camera, config)
-            except AssociationError:
-                found = None
+        person, found = self._sized(found)
         self._clock("start")
         if (
             found is None
             or found.agreed.explained < config.judge.start_explained
             or not acceptable(found.agreed, found.fit.surface.rms_m, config.judge)
         ):
+            self._failed_s = -np.inf if found is None else frame.timestamp_s
             return self._nothing(frame, "initialising", began)
+        return self._meet_at(frame, person, found, began)
+
+    def _sized(self, found: Start | None) -> tuple[Human, Start | None]:
+        """The person of a start in her own size, unless it is known already."""
+        person, config = self.human, self.config
+        if found is None or len(person.shape) or not config.start.shape_coefficients:
+            return person, found
+        try:
+            return sized(person, found, self.T_world_camera, config)
+        except AssociationError:
+            return person, None
+
+    def _meet_at(self, frame: Frame, person: Human, found: Start, began: float) -> FrameResult:
+        """Take a start as the first pose."""
         self._meet(person)
         priors = [diagonal_prior(self._resting, self._prior_sigma)]
         return self._report(frame, found.observation, found.fit, priors, NONE, began)

@@ -28,7 +28,7 @@ from synthesis.sensors.sensor import Sensor
 
 PERSON = 425
 """Who is filmed: a strong man of 31 years, one that nothing is trained on."""
-DISTANCE_M, HEIGHT_M = 3.0, 1.0
+DISTANCE_M, HEIGHT_M = 3.3, 1.0
 """Where the level camera stands: from the person's start, above the floor [m]."""
 DARK = Lights(sky=np.zeros(3), ground=np.zeros(3))
 """The sensor's own light is enough for depth."""

@@ -14,7 +14,7 @@ from kintrack.body import run_kinematics
 from kintrack.errors import SceneError
 from synthesis.barrier import barrier
 from synthesis.mesh import Mesh, join
-from synthesis.motions.actions import ACTIONS, SHORTEST_S, act
+from synthesis.motions.actions import ACTIONS, GRIPPING_ACTIONS, SHORTEST_S, act
 from synthesis.motions.mocap import excerpt, load_clip
 from synthesis.motions.motion import RATE_HZ, Motion
 from synthesis.motions.performance import Performance, Prop
@@ -91,7 +91,8 @@ def build_scene(take: Take, mocap: Path | None = None) -> Scene:
     if take.sensor not in SENSORS:
         raise SceneError(f"sensor {take.sensor!r}; allowed: {', '.join(SENSORS)}")
     outfit, acting, place, walls, lamps, colour = np.random.default_rng(take.seed).spawn(6)
-    person = load_person(take.person, hands="relaxed")
+    hands = "closed" if take.action in GRIPPING_ACTIONS else "relaxed"
+    person = load_person(take.person, hands=hands)
     around = THINGS if take.held_out_things else training_things()
     before = held_out_things() if take.held_out_things else training_things()
     performance = _perform(take, person, acting, mocap)

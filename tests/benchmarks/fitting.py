@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import ast
-import hashlib
 import json
 import multiprocessing
 import os
@@ -16,9 +14,8 @@ from pathlib import Path
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-import kintrack
 from kintrack import __version__
-from kintrack.body import model_folder
+from kintrack.bench.digest import code_digest
 from kintrack.config import TrackerConfig
 from kintrack.fit import fit_sequence
 from kintrack.geometry import camera_pose
@@ -27,9 +24,6 @@ from kintrack.sequence import open_sequence
 
 CODE_FILE = "code.sha256"
 """Digest of the tracker's code that made a result, written beside it once it is finished."""
-
-_NOT_TRACKING = ("cli", "evaluate", "metrics", "viewer", "demo", "export", "modelling")
-"""Modules that no fitted pose depends on."""
 
 
 @dataclass(frozen=True)
@@ -57,19 +51,6 @@ class Job:
             and summary.get("T_world_camera") == camera_pose(self.pitch_deg).tolist()
             and code == digest
         )
-
-
-def code_digest() -> str:
-    """SHA-256 over code and model that decide the poses; layout and comments do not count."""
-    package = Path(kintrack.__file__).parent
-    digest = hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
-        if path.relative_to(package).parts[0].removesuffix(".py") not in _NOT_TRACKING:
-            digest.update(ast.dump(ast.parse(path.read_bytes())).encode())
-    model = model_folder()
-    for path in [model / "human.urdf", *sorted((model / "skin").glob("*.npz"))]:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
 
 
 def fit_all(jobs: Sequence[Job], processes: int, fresh: bool = False) -> dict[Path, str]:

@@ -21,6 +21,7 @@ from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
 import kintrack
+from kintrack.bench.cases import pitch_of
 from kintrack.geometry import LABELS, camera_pose
 from kintrack.joints import JOINT_NAMES
 from kintrack.labelling.foreground import find_foreground, only_person
@@ -180,7 +181,7 @@ def print_table(scores: Sequence[Score]) -> None:
 def main(
     folders: Annotated[tuple[Path, ...], tyro.conf.Positional] = (DEMO,),
     strides: tuple[int, ...] = (1,),
-    camera_pitch_deg: float = 0.0,
+    camera_pitch_deg: float | None = None,
     output: Path | None = None,
 ) -> None:
     """Score recordings.
@@ -188,13 +189,15 @@ def main(
     Args:
         folders: Sequence folders; the recording that ships if none is given.
         strides: Also label every n-th frame only.
-        camera_pitch_deg: How far the cameras look down [deg].
+        camera_pitch_deg: How far the cameras look down [deg]; for synthetic recordings what they
+            say themselves if not given.
         output: JSON to write.
     """
     scores = []
     for folder in folders:
+        pitch_deg = pitch_of(folder) if camera_pitch_deg is None else camera_pitch_deg
         for stride in strides:
-            scores.append(score_recording(folder, stride, camera_pitch_deg, LabellingConfig()))
+            scores.append(score_recording(folder, stride, pitch_deg, LabellingConfig()))
             print_table(scores[-1:])
     if output is not None:
         write_json(output, {"recordings": [score.to_dict() for score in scores]})

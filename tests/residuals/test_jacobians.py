@@ -8,6 +8,7 @@ from scipy.linalg import block_diag
 from kintrack.body import run_kinematics
 from kintrack.config import PriorConfig, SurfaceConfig
 from kintrack.human import RESTING_DEG, posed, prior_sigma
+from kintrack.residuals.joints import JointResidual
 from kintrack.residuals.linearization import quadratic_of
 from kintrack.residuals.prior import diagonal_prior, gaussian_prior
 from kintrack.residuals.surface import silhouette_residual, surface_residual
@@ -41,7 +42,13 @@ def motion_prior(human, state, rng):
     return gaussian_prior(predicted, covariance)
 
 
-TERMS = [surface, silhouette, pose_prior, motion_prior]
+def joints(human, state, rng):
+    rows = np.array([0, 4, 8, 12])
+    places = state.joint_positions_world[rows] + rng.normal(0, 0.1, (4, 3))
+    return JointResidual(rows, places, 0.03)
+
+
+TERMS = [surface, silhouette, pose_prior, motion_prior, joints]
 
 
 @pytest.fixture(params=TERMS, ids=lambda make: make.__name__)

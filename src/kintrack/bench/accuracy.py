@@ -8,17 +8,18 @@ nothing again. A stopped bench goes on where it was.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from kintrack.bench.cases import DISTANCES_M, Case, cases_of, thing_of
 from kintrack.bench.digest import code_digest
-from kintrack.bench.methods import METHODS
+from kintrack.bench.methods import METHODS, Task
 from kintrack.bench.running import Fitting, Job, Occlusion, run_all
 from kintrack.bench.scores import Errors, errors_of, summary
 from kintrack.errors import ConfigError, SequenceError
+from kintrack.evaluate import REFERENCE_FILE
 from kintrack.result import TRACK_FILE, make_result_folder, write_json
 from kintrack.sequence import open_sequence
 from synthesis.dataset.build import MANIFEST, build_dataset, sequences
@@ -28,6 +29,8 @@ from synthesis.occlusion.occlude import FACTS_FILE
 RESULT_FILE = "accuracy.json"
 GROUPS = ("alone", "room", "real")
 """Synthetic people with nothing around them, the same in rooms, real recordings."""
+KINECT = "kinect"
+"""The real recordings against the joints that came with them."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,8 @@ class AccuracyConfig:
 
     methods: tuple[str, ...] = ("geometry",)
     """Methods to compare."""
+    groups: tuple[str, ...] = GROUPS
+    """Groups of recordings: synthetic ones with nothing around, the same in rooms, real ones."""
     seed: int = 0
     """Draws people, motions, rooms, objects and noise."""
     frames: int | None = None
@@ -44,9 +49,10 @@ class AccuracyConfig:
     """Processes."""
 
     def __post_init__(self) -> None:
-        unknown = sorted(set(self.methods) - set(METHODS))
-        if unknown or not self.methods:
-            raise ConfigError(f"methods {self.methods!r}: allowed are {', '.join(METHODS)}")
+        for name, known in (("methods", tuple(METHODS)), ("groups", GROUPS)):
+            given = getattr(self, name)
+            if not given or set(given) - set(known):
+                raise ConfigError(f"{name} {given!r}: allowed are {', '.join(known)}")
         if self.workers < 1:
             raise ConfigError(f"workers = {self.workers}: at least 1 is needed")
 
@@ -96,18 +102,21 @@ def run_accuracy(
     cases = [case for case in cases if case not in failed]
     digest = code_digest()
     fits = [
-        Fitting(method, case.sequence, result_of(folder, method, case))
+        Fitting(
+            method,
+            Task(
+                case.sequence,
+                clean[case.group, case.name],
+                case.pitch_deg,
+                result_of(folder, method, case),
+            ),
+        )
         for method in config.methods
         for case in cases
     ]
     todo = [fit for fit in fits if not fit.is_done(digest)]
-    _run("tracking", todo, [fit.sequence for fit in todo], config, on_progress)
-    errors = {
-        method: [
-            errors_of(c, result_of(folder, method, c), _truth(folder, c, clean)) for c in cases
-        ]
-        for method in config.methods
-    }
+    _run("tracking", todo, [fit.task.sequence for fit in todo], config, on_progress)
+    errors = {method: list(_scored(folder, method, cases, clean)) for method in config.methods}
     content = _content(config, errors, failed)
     write_json(folder / RESULT_FILE, content)
     return content
@@ -125,21 +134,26 @@ def clean_of(jobs: Sequence[Occlusion]) -> list[Path]:
 
 def _recordings(folder, config, mocap, real, on_progress) -> dict[str, list[Path]]:
     """Clean recordings by group; synthetic ones are made where they are missing."""
-    takes = takes_of("bench", config.seed, mocap, config.frames)
+    takes = [
+        take
+        for take in takes_of("bench", config.seed, mocap, config.frames)
+        if take.part in config.groups
+    ]
     root = folder / "recordings"
     total = sum(take.frames for take in takes)
-    build_dataset(
-        root,
-        takes,
-        {"recipe": "bench", "seed": config.seed},
-        mocap,
-        config.workers,
-        lambda progress: on_progress("filming", progress.frames, total),
-    )
     by_group: dict[str, list[Path]] = {group: [] for group in GROUPS}
-    for path in sequences(root):
-        by_group[path.parent.name].append(path)
-    if real is not None:
+    if takes:
+        build_dataset(
+            root,
+            takes,
+            {"recipe": "bench", "seed": config.seed},
+            mocap,
+            config.workers,
+            lambda progress: on_progress("filming", progress.frames, total),
+        )
+        for path in sequences(root):
+            by_group[path.parent.name].append(path)
+    if real is not None and "real" in config.groups:
         by_group["real"] = sorted(p for p in real.iterdir() if (p / "depth.txt").is_file())
         if not by_group["real"]:
             raise SequenceError(
@@ -156,18 +170,28 @@ def _run(
     failed = run_all(jobs, config.workers, lambda done: on_progress(what, done, total))
     for job, problem in failed.items():
         if isinstance(job, Fitting):
-            raise SequenceError(f"{job.sequence}: {problem}")
+            raise SequenceError(f"{job.task.sequence}: {problem}")
     return {job.case: problem for job, problem in failed.items() if isinstance(job, Occlusion)}
 
 
-def _truth(folder: Path, case: Case, clean: dict[tuple[str, str], Path]) -> Path:
-    """Exact joints of a synthetic person; of a real one, the geometric fit of the clean recording.
+def _scored(
+    folder: Path, method: str, cases: Sequence[Case], clean: dict[tuple[str, str], Path]
+) -> Iterator[Errors]:
+    """Every case against its truth, real ones against the Kinect's joints too.
 
-    [Wan19] takes the tracker's own fit of the recording without the object as truth, too.
+    Joints of a synthetic person are exact. For a real one the geometric fit of the clean recording
+    counts as true, as in [Wan19].
     """
-    if case.group != "real":
-        return clean[case.group, case.name] / "reference_joints.csv"
-    return result_of(folder, "geometry", Case("real", case.name, None, case.sequence)) / TRACK_FILE
+    for case in cases:
+        found = result_of(folder, method, case)
+        reference = clean[case.group, case.name] / REFERENCE_FILE
+        if case.group != "real":
+            yield errors_of(case, found, reference)
+            continue
+        own = result_of(folder, "geometry", replace(case, distance_m=None))
+        yield errors_of(case, found, own / TRACK_FILE)
+        if reference.is_file():
+            yield errors_of(replace(case, group=KINECT), found, reference)
 
 
 def _content(
@@ -176,7 +200,7 @@ def _content(
     conditions = ("clean", *(f"{100 * d:.0f} cm" for d in DISTANCES_M))
     scores: dict[str, Any] = {}
     for method, found in errors.items():
-        for group in GROUPS:
+        for group in (*GROUPS, KINECT):
             for condition in conditions:
                 chosen = [
                     e for e in found if e.case.group == group and e.case.condition == condition

@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from kintrack.errors import SceneError
+from kintrack.geometry import camera_pose
 from kintrack.sequence import open_sequence
+from synthesis.dataset.record import TAKE_FILE
 from synthesis.objects.catalogue import held_out_things
 from synthesis.occlusion.occlude import FACTS_FILE, OccludeConfig, occlude
 from synthesis.occlusion.placing import PlacingConfig
@@ -37,6 +39,8 @@ class Case:
     """Distance of the object [m]; None without one."""
     sequence: Path
     """Its folder."""
+    pitch_deg: float = 0.0
+    """How far its camera looks down [deg]."""
 
     @property
     def condition(self) -> str:
@@ -62,11 +66,21 @@ def cases_of(
     """
     cases = []
     for path in recordings:
-        cases.append(Case(group, path.name, None, path))
+        pitch_deg = pitch_of(path)
+        cases.append(Case(group, path.name, None, path, pitch_deg))
         for distance_m in distances_m:
             place = folder / group / f"{100 * distance_m:.0f}_cm" / path.name
-            cases.append(Case(group, path.name, distance_m, place))
+            cases.append(Case(group, path.name, distance_m, place, pitch_deg))
     return cases
+
+
+def pitch_of(sequence: Path) -> float:
+    """How far the camera of a synthetic recording looks down [deg]; 0 for any other."""
+    path = sequence / TAKE_FILE
+    if not path.is_file():
+        return 0.0
+    ahead = np.array(json.loads(path.read_text())["T_world_camera"])[:3, 2]
+    return float(np.degrees(np.arcsin(-ahead[2])))
 
 
 def make_occluded(
@@ -99,7 +113,14 @@ def make_occluded(
         config = OccludeConfig(PlacingConfig(case.distance_m, SHARE), seed=int(rng.integers(2**31)))
         shutil.rmtree(case.sequence, ignore_errors=True)
         try:
-            occlude(sequence, case.sequence, thing, config=config, on_frame=on_frame)
+            occlude(
+                sequence,
+                case.sequence,
+                thing,
+                config=config,
+                T_world_camera=camera_pose(case.pitch_deg),
+                on_frame=on_frame,
+            )
             return
         except SceneError as error:
             problem = error

@@ -7,7 +7,6 @@ import ast
 import hashlib
 from pathlib import Path
 
-import kintrack
 from kintrack.body import model_folder
 
 NOT_TRACKING = (
@@ -28,7 +27,7 @@ NOT_TRACKING = (
 
 def code_digest() -> str:
     """SHA-256 over code and model that decide the poses; layout and comments do not count."""
-    package = Path(kintrack.__file__).parent
+    package = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for path in sorted(package.rglob("*.py")):
         if path.relative_to(package).parts[0].removesuffix(".py") not in NOT_TRACKING:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ _TITLES = {
     "alone": "synthetic, nothing around the person",
     "room": "synthetic, in rooms",
     "real": "real recordings, against the clean fit",
+    "kinect": "real recordings, agreement with the Kinect",
 }
 
 
@@ -35,9 +37,7 @@ def write_pictures(content: dict[str, Any], folder: Path) -> tuple[Path, ...]:
     """
     figures = {CURVES_FILE: draw_curves(content["scores"]), JOINTS_FILE: _joints(content["scores"])}
     for name, figure in figures.items():
-        write_atomically(
-            folder / name, lambda file, figure=figure: figure.savefig(file, format="png", dpi=180)
-        )
+        write_atomically(folder / name, partial(figure.savefig, format="png", dpi=180))
     return tuple(folder / name for name in figures)
 
 

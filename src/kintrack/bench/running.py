@@ -14,7 +14,7 @@ from pathlib import Path
 
 from kintrack.bench.cases import Case, make_occluded
 from kintrack.bench.digest import code_digest
-from kintrack.bench.methods import METHODS
+from kintrack.bench.methods import METHODS, Task
 from kintrack.errors import KintrackError
 
 CODE_FILE = "code.sha256"
@@ -44,23 +44,21 @@ class Fitting:
 
     method: str
     """Name of the method."""
-    sequence: Path
-    """The recording."""
-    result: Path
-    """Where the result goes."""
+    task: Task
+    """What it works on."""
 
     def is_done(self, digest: str) -> bool:
         """Whether the result was made by this code."""
         try:
-            return (self.result / CODE_FILE).read_text().strip() == digest
+            return (self.task.result / CODE_FILE).read_text().strip() == digest
         except OSError:
             return False
 
     def run(self) -> None:
         """Run it."""
-        (self.result / CODE_FILE).unlink(missing_ok=True)
-        METHODS[self.method](self.sequence, self.result, _count)
-        (self.result / CODE_FILE).write_text(code_digest() + "\n")
+        (self.task.result / CODE_FILE).unlink(missing_ok=True)
+        METHODS[self.method](self.task, _count)
+        (self.task.result / CODE_FILE).write_text(code_digest() + "\n")
 
 
 Job = Occlusion | Fitting

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +13,7 @@ from rich.table import Table
 
 from kintrack.bench.accuracy import RESULT_FILE, AccuracyConfig, run_accuracy
 from kintrack.bench.figure import write_pictures
+from kintrack.bench.filming import FilmingConfig, run_filming
 from kintrack.commands.console import StepProgress, console
 
 
@@ -42,11 +44,32 @@ class BenchAccuracy:
 
 
 @dataclass(frozen=True)
+class BenchFilming:
+    """Frames per second of the data engine at 512 x 424 with noise, colour and writing."""
+
+    config: Annotated[FilmingConfig, tyro.conf.OmitArgPrefixes] = field(
+        default_factory=FilmingConfig
+    )
+    """How many frames and processes."""
+
+    def run(self) -> None:
+        """Time it with progress, print the rates."""
+        with StepProgress() as progress:
+            found = run_filming(self.config, progress)
+        for kind, rates in found.items():
+            console.print(
+                f"{kind}: {rates['frames_per_second']:.1f} frames/s with {self.config.workers} "
+                f"processes, {rates['bytes_per_frame'] / 1e3:.0f} kB a frame"
+            )
+
+
+@dataclass(frozen=True)
 class Bench:
     """Measure on held-out people, motions and objects."""
 
     what: Annotated[
-        Annotated[BenchAccuracy, tyro.conf.subcommand("accuracy")],
+        Annotated[BenchAccuracy, tyro.conf.subcommand("accuracy")]
+        | Annotated[BenchFilming, tyro.conf.subcommand("filming")],
         tyro.conf.OmitSubcommandPrefixes,
         tyro.conf.OmitArgPrefixes,
     ]
@@ -59,25 +82,31 @@ class Bench:
 
 def accuracy_table(content: dict[str, Any]) -> Table:
     """Errors by method, group and distance."""
-    table = Table(title="Joint error (cm); share of joints within 10 cm", title_justify="left")
-    for title in ("method", "recordings", "object"):
-        table.add_column(title)
-    for title in ("hidden", "posed", "all", "visible", "hidden joints", "within 10 cm", "tracking"):
-        table.add_column(title, justify="right")
+    table = Table(title="Joint error (cm), share of joints within 10 cm", title_justify="left")
+    for title in ("method", "set", "object"):
+        table.add_column(title, no_wrap=True)
+    for title in ("n", "hidden", "posed", "all", "seen", "unseen", "<10 cm"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for method, group, condition, found in rows_of(content):
+        table.add_row(
+            method,
+            group,
+            condition,
+            str(found["recordings"]),
+            percent(found["hidden_share"]),
+            percent(found["all"]["posed"]),
+            *(centimetres(found[part]["mean_m"]) for part in ("all", "visible", "hidden")),
+            percent(within(found, 0.10)),
+        )
+    return table
+
+
+def rows_of(content: dict[str, Any]) -> Iterator[tuple[str, str, str, dict[str, Any]]]:
+    """Method, group, condition and scores, in the order of the table."""
     for method, groups in content["scores"].items():
         for group, conditions in groups.items():
             for condition, found in conditions.items():
-                table.add_row(
-                    method,
-                    f"{found['recordings']} {group}",
-                    condition,
-                    _percent(found["hidden_share"]),
-                    _percent(found["all"]["posed"]),
-                    *(_cm(found[part]["mean_m"]) for part in ("all", "visible", "hidden")),
-                    _percent(within(found, 0.10)),
-                    _percent(found["tracking"]),
-                )
-    return table
+                yield method, group, condition, found
 
 
 def within(found: dict[str, Any], threshold_m: float) -> float | None:
@@ -88,9 +117,11 @@ def within(found: dict[str, Any], threshold_m: float) -> float | None:
     return float(found["all"]["accuracy"][distances.index(min(distances))])
 
 
-def _percent(share: float | None) -> str:
-    return "-" if share is None else f"{100 * share:.1f} %"
+def percent(share: float | None) -> str:
+    """A share in percent, to be printed."""
+    return "-" if share is None else f"{100 * share:.1f}%"
 
 
-def _cm(length_m: float | None) -> str:
+def centimetres(length_m: float | None) -> str:
+    """A length in centimetres, to be printed."""
     return "-" if length_m is None else f"{100 * length_m:.1f}"

@@ -9,14 +9,14 @@ from typing import Annotated
 
 import numpy as np
 import tyro
-from synthesis.objects.cutout import load_cutout, load_scene_frame
-from synthesis.objects.files import load_thing
 
 from kintrack.commands.console import StepProgress, console
 from kintrack.commands.recording import Recording
 from kintrack.errors import SceneError
 from kintrack.geometry import camera_pose
 from synthesis.objects.catalogue import THINGS
+from synthesis.objects.cutout import load_cutout, load_scene_frame
+from synthesis.objects.files import load_thing
 from synthesis.objects.thing import Thing
 from synthesis.occlusion.occlude import OccludeConfig, occlude
 

@@ -65,7 +65,7 @@ def paper(seed: int, mocap: Path | None, frames: int | None = None) -> tuple[Tak
     strangers = rng.choice(held_out_people(), PAPER_NEW_PEOPLE, replace=False)
     motions = _shuffled([*training_actions(), *training_clips(mocap, length)], rng)
     new_motions = _shuffled([*HELD_OUT_ACTIONS, *held_out_clips(mocap, length)], rng)
-    takes = []
+    takes: list[Take] = []
     for part, names, who, count in (
         ("train", motions, people, PAPER_TRAIN),
         ("test", new_motions, strangers, PAPER_TEST),
@@ -99,7 +99,7 @@ def training(seed: int, mocap: Path | None, frames: int | None = None) -> tuple[
     rng = np.random.default_rng((seed, 2))
     clips = training_clips(mocap, TRAINING_FRAMES * TRAINING_STRIDE)
     sensors, shares = list(TRAINING_SENSORS), list(TRAINING_SENSORS.values())
-    takes = []
+    takes: list[Take] = []
     for n in range(-(-total // TRAINING_FRAMES)):
         from_clip = bool(clips) and rng.random() < TRAINING_CLIPS
         takes.append(
@@ -132,7 +132,7 @@ def bench(seed: int, mocap: Path | None, frames: int | None = None) -> tuple[Tak
     length = BENCH_FRAMES if frames is None else frames
     rng = np.random.default_rng((seed, 4))
     motions = _shuffled([*HELD_OUT_ACTIONS, *held_out_clips(mocap, length)], rng)
-    takes = []
+    takes: list[Take] = []
     for n in range(BENCH_ACTIONS):
         action, person = motions[n % len(motions)], int(rng.choice(held_out_people()))
         for part in ("alone", "room"):

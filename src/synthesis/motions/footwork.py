@@ -39,6 +39,10 @@ class Stance:
         return np.array([x + ahead, y - outward * self.narrower_m, outward * toe_out])
 
 
+AT_EASE = Stance()
+"""Feet a little further in than the hips, turned out a little."""
+
+
 @dataclass(frozen=True)
 class Gait:
     """How somebody steps."""
@@ -61,6 +65,10 @@ class Gait:
     """Standard deviation of the Gaussian that rounds the height of the pelvis [s]."""
     glide: float = 0.0
     """0: the foot swings with minimum jerk; 1: at a more even speed, 3 u^2 - 2 u^3."""
+
+
+UNHURRIED = Gait()
+"""Careful steps of somebody who stands or turns."""
 
 
 @dataclass(frozen=True)

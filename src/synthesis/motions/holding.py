@@ -205,7 +205,8 @@ def _solve(
     body, data, q = arm.body, arm.data, q.copy()
     lower, upper = body.lower[arm.dofs] + 0.002, body.upper[arm.dofs] - 0.002
     start = scripted + offset
-    posture = (1.0 + RETURNING * (1.0 - share) ** 2) / arm.sigma**2
+    returning = 1.0 + RETURNING * (1.0 - share) ** 2
+    posture, steady = returning / arm.sigma**2, 1.0 / (steady_rad * returning) ** 2
     weights = np.concatenate([np.full(3, 1.0 / PALM_SIGMA_M), np.array(turn) / TURN_SIGMA_RAD])
     X = arm.T_hand_palm.inverse().action
     q[arm.dofs + 1] = scripted
@@ -234,8 +235,8 @@ def _solve(
         r = weights * np.concatenate([difference.translation, pin.log3(difference.rotation)])
         clear_r, clear_J = _clearance(arm, share)
         before = q[arm.dofs + 1].copy()
-        pull = posture * (scripted - before) + (start - before) / steady_rad**2
-        H = J.T @ J + clear_J.T @ clear_J + np.diag(posture + 1.0 / steady_rad**2)
+        pull = posture * (scripted - before) + steady * (start - before)
+        H = J.T @ J + clear_J.T @ clear_J + np.diag(posture + steady)
         slope = J.T @ r + clear_J.T @ clear_r + pull
         at_limit = ((before <= lower) & (slope < 0.0)) | ((before >= upper) & (slope > 0.0))
         free = np.flatnonzero(~at_limit)

@@ -152,7 +152,7 @@ def _pelvis_path(
     gait: Gait,
     rate_hz: float,
 ) -> list[pin.SE3]:
-    """Pose of the pelvis: between the feet, over the standing one, as high as standing legs allow."""
+    """Pose of the pelvis: between the feet, over the standing one, as high as the legs let it."""
     left, right = feet["l"], feet["r"]
     lean = smooth(gait.weight_shift * (right.swinging - left.swinging), rate_hz, gait.follow_s)
     aside = (left.footholds - right.footholds) * [1.0, 1.0, 0.0]

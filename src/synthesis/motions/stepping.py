@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from synthesis.motions.footwork import Stance, Step
+from synthesis.motions.footwork import AT_EASE, Stance, Step
 from synthesis.motions.legs import yaw_matrix
 from synthesis.people.person import Person
 
@@ -23,7 +23,7 @@ def steps_along(
     start_s: float,
     step_length_m: float,
     step_s: float,
-    stance: Stance = Stance(),
+    stance: Stance = AT_EASE,
     first: str = "r",
     from_deg: float = 0.0,
 ) -> tuple[Step, ...]:
@@ -81,7 +81,7 @@ def steps_turning(
     start_s: float,
     step_s: float,
     largest_deg: float = 45.0,
-    stance: Stance = Stance(),
+    stance: Stance = AT_EASE,
     place_m: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Step, ...]:
     """Turn on the spot: the foot on the inner side goes first, the other joins it.
@@ -117,7 +117,7 @@ def steps_aside(
     heading_deg: float,
     start_s: float,
     step_s: float,
-    stance: Stance = Stance(),
+    stance: Stance = AT_EASE,
     first: str = "r",
 ) -> tuple[Step, ...]:
     """One step of each foot to another place, looking where the person looked before.

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.errors import SceneError
+from synthesis.extras import needed
 from synthesis.mesh import Material, Mesh, join, mesh_of
 from synthesis.objects.thing import Thing
 from synthesis.patterns import Image, Plain
@@ -84,8 +85,7 @@ def standing(mesh: Mesh) -> Mesh:
 
 
 def _scene(path: Path) -> Any:
-    import trimesh
-
+    trimesh = needed("trimesh")
     if not path.is_file():
         raise SceneError(f"mesh file {path} does not exist")
     if path.suffix.lower() not in SUFFIXES:

@@ -137,6 +137,7 @@ def _write(sequence, folder, layers, facts, rng, on_frame) -> Occluded:
             skipped += 1
             continue
         out, nearest = _insert(frame, layers, rng)
+        assert out.depth_m is not None
         share = float("nan") if person is None else hidden_share(person, nearest)
         positions = joints[n] if n < len(joints) else np.full((len(names), 3), np.nan)
         behind = hidden_joints(positions, sequence.camera, nearest)

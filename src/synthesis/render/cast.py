@@ -19,6 +19,7 @@ from numpy import ndarray
 
 from kintrack.errors import SceneError
 from kintrack.geometry import PinholeCamera
+from synthesis.extras import needed
 
 TILE_PX = 8
 """Side of the squares in which triangles are looked for [px]."""
@@ -73,8 +74,8 @@ class Caster:
         Raises:
             SceneError: if a vertex is not finite.
         """
-        from embreex import mesh_construction, rtcore_scene
-
+        mesh_construction = needed("embreex.mesh_construction")
+        rtcore_scene = needed("embreex.rtcore_scene")
         if not np.isfinite(vertices_world).all():
             broken = np.flatnonzero(~np.isfinite(vertices_world).all(axis=1))
             raise SceneError(

@@ -15,12 +15,13 @@ from kintrack.errors import SceneError
 from synthesis.motions.actions.carrying import carrying_box, walking_with_suitcase
 from synthesis.motions.actions.exercise import exercising, squatting
 from synthesis.motions.actions.gesturing import pointing, waving
-from synthesis.motions.actions.music import guitar
 from synthesis.motions.actions.handing import handing_over
-from synthesis.motions.actions.reaches import bending_and_lifting, reaching
+from synthesis.motions.actions.idling import arms_swinging, crossing_arms, standing
+from synthesis.motions.actions.lifting import bending_and_lifting
+from synthesis.motions.actions.music import guitar
+from synthesis.motions.actions.reaches import reaching
 from synthesis.motions.actions.sitting import sitting_and_gesturing, sitting_down_and_rising
 from synthesis.motions.actions.small_things import drinking, phone
-from synthesis.motions.actions.idling import arms_swinging, crossing_arms, standing
 from synthesis.motions.actions.turning import turning_away
 from synthesis.motions.actions.walks import walking
 from synthesis.motions.performance import Performance

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Walking with a case, carried at the side or pulled behind, and carrying a box before the belly."""
+"""Walking with a case at the side or pulled behind, and carrying a box before the belly."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
-from kintrack.geometry import invert_rigid
 from synthesis.motions.actions.frames import (
     along_z,
     draw_thing,
@@ -19,12 +18,12 @@ from synthesis.motions.actions.frames import (
     pose,
     upright_chest,
 )
-from synthesis.motions.actions.mood import draw_mood, pick, toss, wander
 from synthesis.motions.actions.idling import shifting
+from synthesis.motions.actions.mood import draw_mood, pick, toss, wander
 from synthesis.motions.actions.walks import draw_walk
 from synthesis.motions.arms import arm
 from synthesis.motions.curves import smooth
-from synthesis.motions.holding import HandPath, frame_path, palm_path, reach
+from synthesis.motions.holding import HandPath, palm_path, reach
 from synthesis.motions.measures import Measures, measure
 from synthesis.motions.motion import RATE_HZ, Motion, perform
 from synthesis.motions.performance import Performance, Prop
@@ -211,8 +210,3 @@ def carrying_box(
     motion = hold_box(person, motion, Ts, thing, np.ones(len(motion.q)))
     performance = Performance("carrying_box", motion, (Prop(thing, Ts, held=True),))
     return moved(performance, T_world_start)
-
-
-def chest_poses(person: Person, motion: Motion) -> Float[ndarray, "n 4 4"]:
-    """T_chest_world of every frame, shape (N, 4, 4)."""
-    return invert_rigid(frame_path(person, motion, "chest"))

@@ -92,9 +92,7 @@ def _lunges(rng: np.random.Generator, mood: Mood) -> Script:
         timed += [(leaves - 0.12, dict(low) | arms), (leaves + out_s, still(low) | hanging)]
         t = leaves + out_s + rng.uniform(0.2, 0.6)
         side = other
-    gait = Gait(
-        heel_off_deg=12.0, heel_strike_deg=8.0, follow_s=0.16, weight_shift=0.15, glide=0.4
-    )
+    gait = Gait(heel_off_deg=12.0, heel_strike_deg=8.0, follow_s=0.16, weight_shift=0.15, glide=0.4)
     return mood.script(*timed, steps=tuple(steps), gait=gait)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation, Slerp
 
 from kintrack.errors import SceneError
@@ -37,15 +38,14 @@ def along_z(
     return T
 
 
-def pose(
-    x: Float[ndarray, " 3"], z: Float[ndarray, " 3"], at: Float[ndarray, " 3"]
-) -> Float[ndarray, "4 4"]:
-    """A frame whose x points along x, and z as near to z as it can; shape (4, 4)."""
-    x = np.asarray(x, dtype=float) / np.linalg.norm(x)
-    y = np.cross(np.asarray(z, dtype=float), x)
-    y /= np.linalg.norm(y)
+def pose(x: ArrayLike, z: ArrayLike, at: ArrayLike) -> Float[ndarray, "4 4"]:
+    """A frame at a place whose x points along x (3,), its z as near to z (3,) as it can; (4, 4)."""
+    ahead, up = np.asarray(x, dtype=float), np.asarray(z, dtype=float)
+    ahead = ahead / np.linalg.norm(ahead)
+    left = np.cross(up, ahead)
+    left /= np.linalg.norm(left)
     T = np.eye(4)
-    T[:3, :3] = np.stack([x, y, np.cross(x, y)], axis=1)
+    T[:3, :3] = np.stack([ahead, left, np.cross(ahead, left)], axis=1)
     T[:3, 3] = at
     return T
 

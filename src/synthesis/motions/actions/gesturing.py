@@ -6,17 +6,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy import ndarray
 
 from synthesis.motions.actions.frames import pose, through, upright_chest
-from synthesis.motions.actions.mood import draw_mood, envelope, pick, spans, toss
 from synthesis.motions.actions.idling import rests, shifting
+from synthesis.motions.actions.mood import draw_mood, envelope, pick, spans, toss
 from synthesis.motions.arms import arm
 from synthesis.motions.gaze import look_at
 from synthesis.motions.holding import HandPath, palm_path, reach
 from synthesis.motions.measures import measure
 from synthesis.motions.motion import perform
 from synthesis.motions.performance import Performance
-from synthesis.motions.poses import FORWARD, sided
+from synthesis.motions.poses import FORWARD, Pose, sided
 from synthesis.people.person import SIDES, Person
 
 
@@ -53,7 +54,8 @@ def pointing(person: Person, rng: np.random.Generator, duration_s: float, things
     stretches = spans(rng, duration_s, (1.6, 3.5), (0.3, 1.5))
     timed = shifting(rng, duration_s)
     timed += rests(mood, stretches, sided(side, FORWARD), 0.6)
-    knots, leans = [], []
+    knots: list[tuple[float, ndarray]] = []
+    leans: list[tuple[float, Pose]] = []
     for start, end in stretches:
         for time_s in (start, end) if toss(rng) else (start + 0.2,):
             yaw, pitch = np.radians([rng.uniform(-25.0, 105.0), rng.uniform(-35.0, 45.0)])

@@ -15,9 +15,9 @@ from synthesis.motions.actions.frames import (
     pose,
     upright_chest,
 )
+from synthesis.motions.actions.idling import shifting
 from synthesis.motions.actions.mood import draw_mood, envelope, pick, spans, toss
 from synthesis.motions.actions.small_things import phone_in_palm, upright_in_fist
-from synthesis.motions.actions.idling import shifting
 from synthesis.motions.footwork import Step
 from synthesis.motions.gaze import look_at
 from synthesis.motions.holding import HandPath, in_hand, palm_path, reach

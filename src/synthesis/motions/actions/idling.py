@@ -121,7 +121,9 @@ def arms_swinging(person: Person, rng: np.random.Generator, duration_s: float, t
     big = envelope(t, spans(rng, duration_s, (3.0, 8.0), (0.1, 1.2)), 1.2)
     big = big * (1.0 + 0.15 * np.sin(2.0 * np.pi * t / rng.uniform(3.0, 6.0)))
     phase = 2.0 * np.pi * t / period + rng.uniform(0.0, 2.0 * np.pi)
-    wave, instead, trunk = np.sin(phase), {}, {}
+    wave = np.sin(phase)
+    instead: dict[str, Float[ndarray, " n"]] = {}
+    trunk: dict[str, Float[ndarray, " n"]] = {}
     ahead, bend = rng.uniform(0.35, 0.85), rng.uniform(0.1, 0.45)
     for side in SIDES:
         sign = -1.0 if side == "r" and how != "together" else 1.0

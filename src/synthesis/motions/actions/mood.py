@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +13,7 @@ from numpy import ndarray
 
 from synthesis.motions.arms import arm
 from synthesis.motions.curves import keyed, minimum_jerk
-from synthesis.motions.footwork import Gait, Stance, Step
+from synthesis.motions.footwork import UNHURRIED, Gait, Stance, Step
 from synthesis.motions.motion import RATE_HZ, Script, frame_times
 from synthesis.motions.poses import Pose, keys, left, right
 
@@ -70,7 +71,7 @@ class Mood:
         *poses: tuple[float, Pose],
         start: Pose | None = None,
         steps: tuple[Step, ...] = (),
-        gait: Gait = Gait(),
+        gait: Gait = UNHURRIED,
         curves: Mapping[str, Float[ndarray, " n"]] | None = None,
         instead: Mapping[str, Float[ndarray, " n"]] | None = None,
     ) -> Script:
@@ -115,7 +116,7 @@ def draw_mood(
         The mood.
     """
     times_s = frame_times(duration_s)
-    curves = {
+    curves: dict[str, Any] = {
         name: np.full(len(times_s), slouch * rng.normal(mean, sd))
         for name, (mean, sd) in SLOUCH_DEG.items()
     }

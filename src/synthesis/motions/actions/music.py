@@ -11,9 +11,9 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from synthesis.motions.actions.frames import draw_thing, place_of, pose, through, upright_chest
+from synthesis.motions.actions.idling import shifting
 from synthesis.motions.actions.mood import draw_mood, envelope, spans, toss, wander
 from synthesis.motions.actions.seat import draw_seated, seat_in_world
-from synthesis.motions.actions.idling import shifting
 from synthesis.motions.arms import arm
 from synthesis.motions.gaze import look_at
 from synthesis.motions.holding import HandPath, reach
@@ -24,7 +24,7 @@ from synthesis.motions.poses import sided
 from synthesis.objects.thing import Thing
 from synthesis.people.person import Person
 
-BELOW_NECK_M = 0.012
+BELOW_NECK_M = 0.008
 """How far the fretting palm lies below the middle of the neck [m]."""
 BEFORE_STRINGS_M = 0.015
 """How far the plucking palm lies before them [m]."""
@@ -68,7 +68,7 @@ def guitar(
     fretting, plucking = _hands(thing, rng, mood.times_s, o, playing, beat_hz)
     share = np.ones(len(t))
     paths = [
-        HandPath(fret, Ts @ fretting, share, (0.5, 0.5, 0.5)),
+        HandPath(fret, Ts @ fretting, share, (0.3, 0.4, 0.3)),
         HandPath(pluck, Ts @ plucking, share, (0.4, 0.6, 0.6)),
     ]
     motion = reach(person, motion, paths)

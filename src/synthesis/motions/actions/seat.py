@@ -13,7 +13,7 @@ from numpy import ndarray
 from kintrack.body import run_kinematics
 from kintrack.geometry import invert_rigid
 from kintrack.skin import skinned_vertices
-from synthesis.motions.actions.frames import draw_thing, place_of, pose
+from synthesis.motions.actions.frames import draw_thing, place_of, pose, through, upright_chest
 from synthesis.motions.actions.mood import Mood, pick, toss
 from synthesis.motions.footwork import Stance, neutral_position
 from synthesis.motions.holding import HandPath, frame_path, reach
@@ -25,14 +25,14 @@ from synthesis.people.person import SIDES, Person
 
 PRESSED_M = 0.010
 """How deep flesh and cushion give way [m]."""
-SEAT_REACH_M = (-0.22, 0.20)
-"""Part of a seat before and behind the pelvis that carries somebody [m]."""
 ROUNDS = 6
 """Corrections of the pelvis' height."""
 EXACT_M = 0.002
-"""How exactly the pelvis' height is found [m]; a leg too short for that is put nearer."""
-NEAREST = 0.25
-"""Least distance from the feet back to the pelvis [leg lengths]."""
+"""How exactly the pelvis' height is found; whose legs are too short sits further forward [m]."""
+MOST_BEHIND_M = -0.10
+"""Furthest that the middle of a seat lies behind the pelvis [m]."""
+TOP_M = 0.02
+"""Depth of a seat's upper surface [m]."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,6 @@ def draw_seated(person: Person, rng: np.random.Generator, mood: Mood, things: Ma
     ahead = -(thigh_m * rng.uniform(0.86, 1.04)) / leg_m
     slump = rng.uniform(-4.0, 14.0)
     seated = {
-        "pelvis_drop": 0.4,
         "pelvis_forward": ahead,
         "pelvis_pitch": float(rng.uniform(-12.0, 4.0)),
         "spine_flexion": slump,
@@ -88,23 +87,42 @@ def draw_seated(person: Person, rng: np.random.Generator, mood: Mood, things: Ma
         toe_out_deg=(float(rng.uniform(0.0, 20.0)), float(rng.uniform(0.0, 20.0))),
         left_ahead_m=float(rng.normal(0.0, 0.05)),
     )
+    rear, front = _top(seat)
+    ahead_m = float(rng.uniform(0.03, 0.10))
+    aside_m = float(rng.normal(0.0, 0.015))
     while True:
+        drop = 0.4
         for _ in range(ROUNDS):
-            script = Script(1.0 / RATE_HZ, {k: ((0.0, v),) for k, v in seated.items()}, (), stance)
+            channels = {**seated, "pelvis_drop": drop}
+            script = Script(
+                1.0 / RATE_HZ, {k: ((0.0, v),) for k, v in channels.items()}, (), stance
+            )
             q = perform(person, script).q[0]
-            error = buttocks(person, q, q[:2], 0.0) - height + PRESSED_M
-            seated["pelvis_drop"] += error / leg_m
-        if abs(error) < EXACT_M or seated["pelvis_forward"] > -NEAREST:
+            bounds = (ahead_m + rear, ahead_m + front)
+            error = buttocks(person, q, q[:2], 0.0, bounds) - height + PRESSED_M
+            drop += error / leg_m
+        if abs(error) < EXACT_M or ahead_m < MOST_BEHIND_M:
             break
-        seated["pelvis_forward"] += 0.04
-    back = float(q[0])
+        ahead_m -= 0.03
     T = np.eye(4)
-    T[:2, 3] = back + rng.uniform(0.03, 0.10), rng.normal(0.0, 0.015)
-    return Seated(seat, seated, stance, T)
+    T[:2, 3] = float(q[0]) + ahead_m, aside_m
+    return Seated(seat, channels, stance, T)
+
+
+def _top(seat: Thing) -> tuple[float, float]:
+    """Where the upper surface ends behind and before the place `seat` [m]."""
+    place = place_of(seat, "seat")[:3, 3]
+    v = seat.mesh.vertices
+    top = v[np.abs(v[:, 2] - place[2]) < TOP_M, 0] - place[0]
+    return float(top.min()), float(top.max())
 
 
 def buttocks(
-    person: Person, q: Float[ndarray, " nq"], place_m: Float[ndarray, " 2"], yaw_rad: float
+    person: Person,
+    q: Float[ndarray, " nq"],
+    place_m: Float[ndarray, " 2"],
+    yaw_rad: float,
+    bounds_m: tuple[float, float],
 ) -> float:
     """Height of the lowest skin of pelvis and thighs above a seat [m].
 
@@ -113,13 +131,14 @@ def buttocks(
         q: Configuration, shape (nq,).
         place_m: Where the pelvis is on the floor, shape (2,).
         yaw_rad: Where the person looks.
+        bounds_m: Part of the seat, behind and before the pelvis [m].
     """
     skin = person.skin
     links = [skin.link_names.index(name) for name in ("pelvis", "l_thigh", "r_thigh")]
     of = (skin.weights * np.isin(skin.links, links)).sum(axis=1) > 0.6
     vertices = skinned_vertices(run_kinematics(person.body, q), skin)[of]
     ahead = (vertices[:, :2] - place_m) @ [np.cos(yaw_rad), np.sin(yaw_rad)]
-    above = (ahead > SEAT_REACH_M[0]) & (ahead < SEAT_REACH_M[1])
+    above = (ahead > bounds_m[0]) & (ahead < bounds_m[1])
     return float(vertices[above, 2].min())
 
 
@@ -167,8 +186,6 @@ def gesturing_hands(
     sides: tuple[str, ...] = SIDES,
 ) -> Motion:
     """Hands that talk: from place to place before the chest, with short rests."""
-    from synthesis.motions.actions.frames import through, upright_chest
-
     m, chest, paths = measure(person), upright_chest(person, motion), []
     for side in sides:
         outward = 1.0 if side == "l" else -1.0

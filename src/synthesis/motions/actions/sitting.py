@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from synthesis.motions.actions.idling import folded
 from synthesis.motions.actions.mood import draw_mood, envelope, pick, spans, toss
 from synthesis.motions.actions.seat import (
     draw_seated,
@@ -15,7 +16,6 @@ from synthesis.motions.actions.seat import (
     hands_on_lap,
     seat_in_world,
 )
-from synthesis.motions.actions.idling import folded
 from synthesis.motions.footwork import Gait, Step
 from synthesis.motions.measures import measure
 from synthesis.motions.motion import perform

@@ -17,8 +17,8 @@ from synthesis.motions.actions.frames import (
     pose,
     upright_chest,
 )
-from synthesis.motions.actions.mood import Mood, draw_mood, envelope, pick, spans, toss, wander
 from synthesis.motions.actions.idling import shifting
+from synthesis.motions.actions.mood import Mood, draw_mood, envelope, pick, spans, toss, wander
 from synthesis.motions.actions.walks import draw_walk
 from synthesis.motions.curves import minimum_jerk
 from synthesis.motions.gaze import look_at

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -188,6 +188,9 @@ def draw_walk(
             break
         steps += turning
         heading, t = heading + about, turning[-1].end_s + rng.uniform(0.05, 0.5)
+    spare_s = duration_s - steps[-1].end_s - 0.8 if steps else 0.0
+    wait_s = float(rng.uniform(0.0, max(spare_s, 0.0)))
+    steps = [replace(s, start_s=s.start_s + wait_s, end_s=s.end_s + wait_s) for s in steps]
     mean, spread = HEADINGS_DEG.get(kind, (0.0, 180.0))
     yaw = np.radians(rng.normal(mean, spread) * (1.0 if toss(rng) else -1.0))
     reached = np.array([[0.0, 0.0]] + [[s.forward_m, s.left_m] for s in steps])
