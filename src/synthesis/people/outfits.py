@@ -27,8 +27,12 @@ from synthesis.people.hats import HATS
 from synthesis.people.population import Facts
 from synthesis.people.shoes import Shoe
 
-DARK_CLOTH = 0.15
+DARK_CLOTH = 0.07
 """Share of cloth that is dark to the sensor's light as well."""
+DRESSES, SKIRTS = 0.10, 0.12
+"""Share of women in a dress, and of the others in a skirt."""
+LONG_HEM = 0.25
+"""Share of dresses and skirts that end below the knee."""
 HAIR_INFRARED = (0.05, 0.40)
 """Reflectance of hair."""
 GREY_FROM_YEARS = 45.0
@@ -81,9 +85,9 @@ def draw_outfit(facts: Facts, rng: np.random.Generator) -> Outfit:
         rng: Draws everything.
     """
     woman = facts.sex == "woman"
-    dress = woman and rng.random() < 0.22
+    dress = woman and rng.random() < DRESSES
     top = _dress(rng) if dress else _top(rng, woman)
-    skirt = woman and not dress and rng.random() < 0.30
+    skirt = woman and not dress and rng.random() < SKIRTS
     bottom = None if dress else _skirt(rng) if skirt else _trousers(rng)
     tucked = bool(not dress and top.collar not in ("hood",) and rng.random() < 0.35)
     jacket = _jacket(rng) if top.collar != "hood" and rng.random() < 0.30 else None
@@ -146,16 +150,21 @@ def _jacket(rng: np.random.Generator) -> Top:
 def _dress(rng: np.random.Generator) -> Top:
     """Dresses."""
     sleeve = float(rng.choice([0.0, 0.5, 1.2, 1.85]))
-    hem, flare = float(rng.uniform(-0.85, -0.32)), float(rng.uniform(0.05, 0.28))
+    hem, flare = _hem_m(rng), float(rng.uniform(0.05, 0.20))
     neckline = float(rng.uniform(0.75, 1.2))
     return Top(sleeve, 0.007, float(rng.uniform(0.006, 0.03)), hem, 0.5, flare, neckline, "none")
+
+
+def _hem_m(rng: np.random.Generator) -> float:
+    """Where a dress or a skirt ends, relative to the hips [m]: mostly about the knee."""
+    return float(rng.uniform(-0.80, -0.58) if rng.random() < LONG_HEM else rng.uniform(-0.55, -0.3))
 
 
 def _skirt(rng: np.random.Generator) -> Skirt:
     """Skirts from above the knee to the ankle, narrow or wide."""
     flare = float(rng.choice([-0.02, 0.08, 0.18, 0.30]) + rng.uniform(-0.02, 0.03))
     fold = float(rng.uniform(0.004, 0.02))
-    return Skirt(float(rng.uniform(-0.78, -0.30)), float(rng.uniform(0.08, 0.16)), flare, fold)
+    return Skirt(_hem_m(rng), float(rng.uniform(0.08, 0.16)), flare, fold)
 
 
 def _trousers(rng: np.random.Generator) -> Trousers:
