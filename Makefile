@@ -40,6 +40,9 @@ model: $(MODEL)  ## rebuild model/ and its pictures in docs/
 results: $(DEV)  ## measure accuracy and speed; writes docs/results.md
 	$(PY) tests/benchmarks/real_recordings.py $(if $(DATA),--data "$(DATA)")
 	$(PY) tests/benchmarks/speed.py $(if $(DATA),--data "$(DATA)")
+	$(PY) tests/benchmarks/sensor_statistics.py $(if $(DATA),--data "$(DATA)")
+	$(PY) tests/benchmarks/data_engine.py $(if $(DATA),--data "$(DATA)")
+	$(PY) tests/benchmarks/accuracy.py $(if $(DATA),--data "$(DATA)")
 
 clean:  ## remove what the other targets wrote, but not the environment
 	rm -rf kintrack-demo build dist out .pytest_cache .ruff_cache .mypy_cache
@@ -57,11 +60,12 @@ $(RUN): $(NEEDS) | $(PY)
 	$(PIP) -e .
 	@touch $@
 
+# torch first: it is by far the largest and the one whose version matters most
 $(DEV): $(NEEDS) | $(PY)
+	$(PIP) torch
 	$(PIP) -e '.[dev]'
 	@touch $@ $(RUN)
 
-# torch first: it is by far the largest and the one whose version matters most
 $(MODEL): $(NEEDS) | $(PY)
 	$(PIP) torch
 	$(PIP) -e '.[model]'

@@ -47,7 +47,11 @@ HEAVY = {
     "synthesis/people/build.py": {"torch", "anny"},
     "synthesis/objects/files.py": {"trimesh", "PIL"},
     "synthesis/render/": {"embreex"},
-    "segmentation/": {"torch", "openvino"},
+    "segmentation/networks.py": {"torch"},
+    "segmentation/loss.py": {"torch"},
+    "segmentation/calibrate.py": {"torch"},
+    "segmentation/runtime.py": {"torch", "openvino"},
+    "segmentation/graph.py": {"openvino"},
 }
 """Who may import which of the packages that not everybody has."""
 ALL_HEAVY = {"torch", "anny", "pymeshlab", "trimesh", "embreex", "skimage", "PIL", "openvino"}

@@ -12,6 +12,7 @@ from kintrack.tracker import Tracker
 
 ROOT = Path(__file__).resolve().parents[1]
 DEMO = ROOT / "src" / "kintrack" / "demo"
+COMMANDS = ("fit", "view", "evaluate", "demo", "label", "occlude", "dataset", "bench", "model")
 QUICK = ["--config.start.shape-coefficients", "0", "--config.start.rounds", "6"]
 
 
@@ -233,7 +234,7 @@ def test_help_lists_the_commands(capsys):
         main(["--help"])
     assert ended.value.code == 0
     text = capsys.readouterr().out
-    assert all(command in text for command in ("fit", "view", "evaluate", "demo", "model"))
+    assert all(command in text for command in COMMANDS)
 
 
 def test_interrupting_ends_with_130_and_a_valid_result(recording, capsys, monkeypatch):

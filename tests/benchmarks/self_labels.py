@@ -16,6 +16,7 @@ from typing import Annotated
 
 import cv2
 import numpy as np
+import report
 import tyro
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
@@ -183,6 +184,7 @@ def main(
     strides: tuple[int, ...] = (1,),
     camera_pitch_deg: float | None = None,
     output: Path | None = None,
+    write: bool = False,
 ) -> None:
     """Score recordings.
 
@@ -192,6 +194,7 @@ def main(
         camera_pitch_deg: How far the cameras look down [deg]; for synthetic recordings what they
             say themselves if not given.
         output: JSON to write.
+        write: Also rewrite the section in docs/results.md.
     """
     scores = []
     for folder in folders:
@@ -201,6 +204,65 @@ def main(
             print_table(scores[-1:])
     if output is not None:
         write_json(output, {"recordings": [score.to_dict() for score in scores]})
+    if write:
+        report.rewrite_section(report.RESULTS, "self-labels", section(scores, len(folders)))
+
+
+def section(scores: Sequence[Score], recordings: int) -> str:
+    """Markdown of the section."""
+    header = ("recording", "frames", "kept", "bad", "bad kept", "good dropped")
+    rows = [_row(score) for score in scores]
+    for every in dict.fromkeys(_every(score.name) for score in scores):
+        chosen = [score for score in scores if _every(score.name) == every]
+        rows.append(_row(pooled("all" + (f" every {every}" if every else ""), chosen)))
+    facts = report.conditions(
+        data=f"{recordings} recordings with exact labels", seeds="those of the recordings"
+    )
+    return f"""## Self-labels against exact labels
+
+`kintrack label` on synthetic recordings of people whom the tracker's template does not resemble.
+A frame is bad if its mean joint error exceeds {100 * BAD_JOINTS_M:.0f} cm or a part in view is
+labelled to less than {100 * BAD_PART_IOU:.0f} % (intersection over union, IoU); the rule that drops
+frames knows neither. IoU [%] is over the kept frames.
+
+{report.table((*header, *(label.replace("_", " ") for label in LABELS)), rows)}
+
+### Conditions
+
+{report.bullets(facts)}
+"""
+
+
+def pooled(name: str, scores: Sequence[Score]) -> Score:
+    """Several recordings as one."""
+    reasons: dict[str, int] = {}
+    for score in scores:
+        for kind, count in score.reasons.items():
+            reasons[kind] = reasons.get(kind, 0) + count
+    kept = sum(score.kept for score in scores)
+    error = sum(score.joint_error_m * score.kept for score in scores if score.kept)
+    return Score(
+        name=name,
+        frames=sum(score.frames for score in scores),
+        kept=kept,
+        reasons=reasons,
+        table=np.sum([score.table for score in scores], axis=0),
+        joint_error_m=error / kept if kept else float("nan"),
+        bad=sum(score.bad for score in scores),
+        bad_kept=sum(score.bad_kept for score in scores),
+        good_dropped=sum(score.good_dropped for score in scores),
+    )
+
+
+def _every(name: str) -> str:
+    """The stride in a score's name; empty for every frame."""
+    return name.partition(" every ")[2]
+
+
+def _row(score: Score) -> list[str]:
+    iou = ("-" if np.isnan(value) else f"{100 * value:.1f}" for value in score.iou())
+    counts = (score.frames, score.kept, score.bad, score.bad_kept, score.good_dropped)
+    return [score.name, *map(str, counts), *iou]
 
 
 if __name__ == "__main__":

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The networks in torch: what training updates and `--runtime torch` runs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from segmentation.architecture import HEAD, Layer, NetworkConfig, draw, plan
+from segmentation.weights import Weights
+
+HEAD_GAIN = 0.1
+"""Spread of the first logits, so that training starts from nearly equal probabilities."""
+
+
+class PartNetwork(nn.Module):
+    """One of the three networks; its layers bear the names of the diagram.
+
+    There is no normalisation layer: He's initialisation keeps the second moment of the input,
+    which `preprocess.py` makes about 1, through all layers (He et al. 2015).
+    """
+
+    def __init__(self, config: NetworkConfig, seed: int | None = None):
+        """Build with random weights.
+
+        Args:
+            config: Which network.
+            seed: Makes the weights repeatable; None takes torch's own state.
+        """
+        super().__init__()
+        self.config = config
+        generator = None if seed is None else torch.Generator().manual_seed(seed)
+        for layer in plan(config).layers:
+            self.add_module(layer.name, _module(layer, generator))
+
+    def forward(self, image: Float[Tensor, "b 4 106 128"]) -> Float[Tensor, "b 7 106 128"]:
+        """Logits of every label at every pixel; `architecture.py` is the diagram."""
+        return draw(self.config, TorchOperations(self), image)
+
+
+def network_of(weights: Weights) -> PartNetwork:
+    """The network of a weights file, set to inference."""
+    network = PartNetwork(weights.config)
+    network.load_state_dict({k: torch.from_numpy(np.array(v)) for k, v in weights.tensors.items()})
+    return network.eval()
+
+
+def tensors_of(network: PartNetwork) -> dict[str, np.ndarray]:
+    """A copy of a network's weights as a weights file keeps them."""
+    state = network.state_dict()
+    return {name: tensor.detach().cpu().float().numpy().copy() for name, tensor in state.items()}
+
+
+class TorchOperations:
+    """The diagram's operations on torch tensors, with a network's weights."""
+
+    def __init__(self, network: nn.Module):
+        """Use the layers of this network."""
+        self._layers = dict(network.named_children())
+
+    def conv(self, name: str, x: Tensor, width: int, relu: bool = True) -> Tensor:
+        """See `Operations`."""
+        out = self._layers[name](x)
+        return F.relu(out) if relu else out
+
+    def pool(self, x: Tensor) -> Tensor:
+        """See `Operations`."""
+        return F.max_pool2d(x, 2)
+
+    def deconv(self, name: str, x: Tensor, width: int, like: Tensor, kernel: int = 4) -> Tensor:
+        """See `Operations`."""
+        return self._layers[name](x, output_size=like.shape[-2:])
+
+    def join(self, a: Tensor, b: Tensor) -> Tensor:
+        """See `Operations`."""
+        return torch.cat([a, b], dim=1)
+
+    def add(self, name: str, a: Tensor, b: Tensor) -> Tensor:
+        """See `Operations`."""
+        return F.relu(a + b)
+
+
+def _module(layer: Layer, generator: torch.Generator | None) -> nn.Module:
+    """A layer with weights of variance gain^2 / fan-in and no bias.
+
+    An output pixel of a deconvolution sees kernel^2 / 4 inputs, since the stride is 2.
+    """
+    module: nn.Conv2d | nn.ConvTranspose2d
+    if layer.kind == "conv":
+        module = nn.Conv2d(layer.inputs, layer.outputs, layer.kernel, padding=layer.kernel // 2)
+        fan_in = layer.inputs * layer.kernel**2
+    else:
+        crop = (layer.kernel - 2) // 2
+        module = nn.ConvTranspose2d(layer.inputs, layer.outputs, layer.kernel, 2, crop)
+        fan_in = layer.inputs * layer.kernel**2 // 4
+    gain = HEAD_GAIN if layer.name == HEAD else math.sqrt(2.0) if layer.relu else 1.0
+    nn.init.normal_(module.weight, std=gain / math.sqrt(fan_in), generator=generator)
+    assert module.bias is not None
+    nn.init.zeros_(module.bias)
+    return module
