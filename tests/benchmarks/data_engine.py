@@ -59,14 +59,14 @@ def section(found: dict[str, Any], config: FilmingConfig) -> str:
         for kind, rates in found.items()
     ]
     facts = report.conditions(
-        data=f"{config.takes} takes of {config.frames} frames for each kind (`paper` recipe, rooms)",
+        data=f"{config.takes} takes of {config.frames} frames each (`paper` recipe, in rooms)",
         seeds=str(config.seed),
     )
     return f"""## Cost of synthetic recordings
 
-Whole rooms at 512 x 424 with a dressed person: rays, colour with shadows, noise of a Kinect v2 and
-of the colour camera, labels, true joints, hidden share, compressed files. {config.workers} processes;
-people, clothes and rooms are drawn within the measured time.
+Whole rooms at 512 x 424 with a dressed person: rays, colour with shadows, noise of a Kinect v2
+and of the colour camera, labels, true joints, hidden share, compressed files.
+{config.workers} processes; people, clothes and rooms are drawn within the measured time.
 
 {report.table(("camera", "frames/s", "kB a frame"), rows)}
 

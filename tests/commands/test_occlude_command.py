@@ -9,6 +9,7 @@ import pytest
 
 from kintrack.cli import main
 from kintrack.sequence import open_sequence
+from kintrack.sequence.write import SequenceWriter
 
 DEMO = Path(__file__).resolve().parents[2] / "src" / "kintrack" / "demo"
 BOX = """v -0.3 -0.3 0
@@ -63,6 +64,17 @@ def test_a_mesh_file_is_inserted_on_the_side_that_is_asked_for(recording, tmp_pa
     before, after = open_sequence(recording).frame(0).depth_m, open_sequence(out).frame(0).depth_m
     changed = np.nonzero((after > 0) & (np.abs(after - before) > 1e-3))[1]
     assert np.median(changed) < np.median(np.nonzero(before)[1])
+
+
+def test_an_rgbd_cut_out_is_inserted(recording, tmp_path):
+    camera = open_sequence(recording).camera
+    depth = np.zeros((camera.height, camera.width), np.float32)
+    depth[80:200, 120:220] = 1.5
+    SequenceWriter(tmp_path / "cutout", camera).write(0.0, depth)
+    out = tmp_path / "out"
+    main(["occlude", str(recording), "-o", str(out), "--object", str(tmp_path / "cutout")])
+    facts = json.loads((out / "occluder.json").read_text())
+    assert facts["hidden_share"] == pytest.approx(0.33, abs=0.08)
 
 
 @pytest.mark.parametrize(
