@@ -11,7 +11,7 @@ SOURCE = ROOT / "src"
 ROWS = (
     ("errors",),
     ("joints",),
-    ("geometry", "raster"),
+    ("geometry", "raster", "components"),
     ("config",),
     ("body",),
     ("skin",),

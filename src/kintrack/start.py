@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
-from numba import njit
 from numpy import ndarray
 
 from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.association.observation import Observation
 from kintrack.body import run_kinematics
+from kintrack.components import components
 from kintrack.config import StartConfig, TrackerConfig
 from kintrack.errors import AssociationError
 from kintrack.geometry import invert_rigid, transform_points
@@ -80,7 +80,7 @@ def find_person(
     cell = max(1, observation.camera.width // 160)
     points = observation.points_camera[::cell, ::cell]
     valid = observation.region[::cell, ::cell] & (points[..., 2] <= config.max_distance_m)
-    blob = _components(points[..., 2], valid, EDGE_M)
+    blob = components(points[..., 2], valid, EDGE_M, 0.0)
     sizes = np.bincount(blob[valid], minlength=1)
     pieces = {i: points[blob == i] for i in np.flatnonzero(sizes >= LEAST_CELLS)}
     people = [i for i, p in pieces.items() if _person_sized(p, T_world_camera, config)]
@@ -231,33 +231,3 @@ def _placed(human, seen: Observation, T_world_camera, posture, heading_rad) -> n
     q[2] = np.quantile(points[:, 2], 0.995) - vertices[:, 2].max()
     q[3:7] = [0, 0, np.sin(yaw / 2), np.cos(yaw / 2)]
     return q
-
-
-@njit(cache=True)
-def _components(z, valid, edge):
-    """Connected cells whose depth differs by less than `edge`, numbered from 0; -1 elsewhere."""
-    h, w = z.shape
-    out = np.full((h, w), -1, dtype=np.int64)
-    stack = np.empty((h * w, 2), dtype=np.int64)
-    count = 0
-    for i in range(h):
-        for j in range(w):
-            if not valid[i, j] or out[i, j] >= 0:
-                continue
-            out[i, j] = count
-            stack[0, 0], stack[0, 1] = i, j
-            top = 1
-            while top > 0:
-                top -= 1
-                a, b = stack[top, 0], stack[top, 1]
-                for da, db in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-                    c, d = a + da, b + db
-                    if c < 0 or d < 0 or c >= h or d >= w:
-                        continue
-                    if not valid[c, d] or out[c, d] >= 0 or abs(z[c, d] - z[a, b]) > edge:
-                        continue
-                    out[c, d] = count
-                    stack[top, 0], stack[top, 1] = c, d
-                    top += 1
-            count += 1
-    return out

@@ -70,15 +70,13 @@ def _curves(axis: Axes, scores: dict[str, Any], group: str, part: str) -> None:
         for condition, found in by_group.get(group, {}).items():
             if found[part]["accuracy"] is None:
                 continue
-            mean = found[part]["mean_m"]
-            says = "no pose" if mean is None else f"{100 * mean:.1f} cm"
             axis.plot(
                 100 * np.array(found["thresholds_m"]),
                 100 * np.array(found[part]["accuracy"]),
                 line,
                 color=_COLORS[condition],
                 lw=1.3,
-                label=f"{method}, {condition} ({says})",
+                label=f"{method}, {condition}",
             )
 
 
@@ -95,11 +93,18 @@ def _joints(scores: dict[str, Any]) -> Figure:
         for n, (condition, found) in enumerate(conditions.items()):
             means = [found["joints"][name]["mean_m"] for name in JOINT_NAMES]
             heights = [np.nan if mean is None else 100 * mean for mean in means]
-            axis.bar(x + (n + 0.5) * width - 0.4, heights, width, color=_COLORS[condition])
+            axis.bar(
+                x + (n + 0.5) * width - 0.4,
+                heights,
+                width,
+                color=_COLORS[condition],
+                label=condition,
+            )
         axis.set_ylabel("mean error [cm]", fontsize=8)
         axis.set_title(_TITLES[group], fontsize=8)
         axis.tick_params(labelsize=7)
         axis.spines[["top", "right"]].set_visible(False)
+    axes[0].legend(fontsize=7, frameon=False, ncols=4)
     words = [re.sub("^l_", "left ", re.sub("^r_", "right ", name)) for name in JOINT_NAMES]
     axes[-1].set_xticks(x, words, rotation=90)
     return figure

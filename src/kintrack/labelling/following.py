@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int
-from numba import njit
+from jaxtyping import Float
 from numpy import ndarray
 
+from kintrack.components import components
 from kintrack.errors import ConfigError
 from kintrack.labelling.room import (
     Plane,
@@ -260,35 +260,3 @@ def sampled_depths(sequence: SequenceReader, most: int, factor: int) -> list[nda
     """Depth images of readable frames, evenly spread and thinned [m]."""
     frames = (sequence.frame(i).depth_m for i in spread_frames(len(sequence), most))
     return [np.asarray(d[::factor, ::factor]) for d in frames if d is not None]
-
-
-@njit(cache=True)
-def components(
-    z: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"], edge_m: float, noise: float
-) -> Int[ndarray, "h w"]:
-    """Pieces that no depth step parts, numbered from 0; -1 elsewhere."""
-    h, w = z.shape
-    out = np.full((h, w), -1, dtype=np.int64)
-    stack = np.empty((h * w, 2), dtype=np.int64)
-    count = 0
-    for i in range(h):
-        for j in range(w):
-            if not valid[i, j] or out[i, j] >= 0:
-                continue
-            out[i, j] = count
-            stack[0, 0], stack[0, 1] = i, j
-            top = 1
-            while top > 0:
-                top -= 1
-                a, b = stack[top, 0], stack[top, 1]
-                for da, db in ((1, 0), (-1, 0), (0, 1), (0, -1)):
-                    c, d = a + da, b + db
-                    if c < 0 or d < 0 or c >= h or d >= w or not valid[c, d] or out[c, d] >= 0:
-                        continue
-                    if abs(z[c, d] - z[a, b]) > edge_m + noise * z[a, b] * z[a, b]:
-                        continue
-                    out[c, d] = count
-                    stack[top, 0], stack[top, 1] = c, d
-                    top += 1
-            count += 1
-    return out
