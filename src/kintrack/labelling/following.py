@@ -31,8 +31,6 @@ BEHIND_M = 0.15
 class ForegroundConfig:
     """What of an image may be the person."""
 
-    background_share: float = 0.5
-    """With readings on fewer of the pixels than this the background was taken out already."""
     max_width_px: int = 320
     """Wider images are thinned to at most this width for the search [px]."""
     edge_m: float = 0.08
@@ -51,6 +49,8 @@ class ForegroundConfig:
     """Things further away are ignored [m]."""
     min_moving: float = 0.15
     """Least share of a first piece that moved, before a still camera."""
+    min_stirring: float = 0.03
+    """The same where no piece of any frame moved that much: somebody who stands and waves."""
     min_free: float = 0.6
     """Least share of a person's outline behind which the image is further away; furniture stands
     against walls and behind people."""
@@ -74,7 +74,7 @@ class ForegroundConfig:
                      "max_growth", "reach_m"):  # fmt: skip
             if not 0 < getattr(self, name) <= 100:
                 raise ConfigError(f"ForegroundConfig.{name} = {getattr(self, name)!r}: 0 to 100")
-        for name in ("background_share", "min_moving", "min_free", "min_overlap"):
+        for name in ("min_moving", "min_stirring", "min_free", "min_overlap"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ConfigError(f"ForegroundConfig.{name} = {getattr(self, name)!r}: 0 to 1")
         for name, low, high in (("max_width_px", 64, 4096), ("samples", 3, 1000)):
@@ -90,6 +90,7 @@ class Scene:
         self.sequence, self.config, self.camera, self.factor = sequence, config, camera, factor
         self.still, self.background = still, background
         self.far = still_background(sampled) if background is None else background
+        self.least_moving = config.min_moving
         self.planes: tuple[Plane, ...] = ()
         self.seen: dict[int, tuple[Plane, ...]] = {}
         if still:
@@ -132,6 +133,9 @@ class Scene:
             depth, piece, planes[i] = self.pieces(i)
             scores[i] = self.first(depth, piece)[0]
             on_frame()
+        if scores.max() <= 0 and self.still:
+            self.least_moving = self.config.min_stirring
+            scores = np.array([self.first(*self.pieces(i)[:2])[0] for i in range(count)])
         if scores.max() <= 0:
             return masks, tuple(planes)
         seed = int(np.argmax(scores))
@@ -158,7 +162,7 @@ class Scene:
         area = np.bincount(piece[found], weights=pixel_m2[found])
         moving = np.bincount(piece[found], weights=(pixel_m2 * moved)[found])
         for k in np.flatnonzero((area >= config.min_area_m2) & (area <= config.max_area_m2)):
-            if moving[k] < config.min_moving * area[k]:
+            if moving[k] < self.least_moving * area[k]:
                 continue
             this = piece == k
             if not self.sized(depth, this):

@@ -25,6 +25,7 @@ from kintrack.geometry import PinholeCamera
 from kintrack.labelling.following import ForegroundConfig, Scene, sampled_depths
 from kintrack.labelling.room import Plane, camera_is_still, on_planes, still_background
 from kintrack.sequence.frame import Frame, SequenceReader
+from kintrack.sequence.removed import background_removed
 
 __all__ = ["Foreground", "ForegroundConfig", "find_foreground", "only_person"]
 
@@ -143,7 +144,7 @@ def find_foreground(
     sampled = sampled_depths(sequence, config.samples, factor)
     if not sampled:
         raise SequenceError(f"{sequence.root}: none of the frames looked at can be read")
-    if empty_room is None and np.mean([np.mean(d > 0) for d in sampled]) < config.background_share:
+    if empty_room is None and np.mean([background_removed(d) for d in sampled]) > 0.5:
         return Foreground("removed", factor, size, (None,) * count, ((),) * count, config)
     still = empty_room is not None or camera_is_still(sampled, config.room)
     background = None

@@ -14,9 +14,8 @@ from numpy import ndarray
 from kintrack.errors import SceneError
 from kintrack.geometry import PinholeCamera
 from kintrack.sequence.frame import Frame
+from kintrack.sequence.removed import background_removed
 
-BACKGROUND_SHARE = 0.5
-"""Share of pixels with a reading from which a recording counts as one with a background."""
 LEAST_PIXELS = 50
 """Fewest pixels that make a person."""
 NEAREST_PERCENTILE = 5.0
@@ -47,7 +46,7 @@ def person_mask(frame: Frame) -> Bool[ndarray, "h w"]:
         height, width = frame.depth_m.shape
         return cv2.resize(frame.labels, (width, height), interpolation=cv2.INTER_NEAREST) > 0
     read = frame.depth_m > 0
-    if read.mean() >= BACKGROUND_SHARE:
+    if not background_removed(frame.depth_m):
         raise SceneError(
             f"frame {frame.index} has a background ({100 * read.mean():.0f} % of its pixels have a "
             f"reading) and no labels, so the person is not known; write labels with "
