@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 from jaxtyping import Float
 from numpy import ndarray
 
@@ -100,7 +101,12 @@ def build_scene(take: Take, mocap: Path | None = None) -> Scene:
     sensor = SENSORS[take.sensor]()
     joints = np.stack([run_kinematics(person.body, q).joint_positions_world for q in motion.q])
     Ts_world_camera = film_from(
-        joints, sensor.camera, place, moving=take.moving_camera, truncated=take.truncated
+        joints,
+        sensor.camera,
+        place,
+        facing_rad=_heading(motion) if take.facing else None,
+        moving=take.moving_camera,
+        truncated=take.truncated,
     )
     standing = [
         prop.thing.mesh.moved(prop.Ts_world_thing[0]) for prop in _props(performance, False)
@@ -125,6 +131,12 @@ def build_scene(take: Take, mocap: Path | None = None) -> Scene:
         Ts_world_camera=Ts_world_camera,
         stride=take.stride,
     )
+
+
+def _heading(motion: Motion) -> float:
+    """Where the person looks in the first frame, about z [rad]."""
+    ahead = pin.XYZQUATToSE3(motion.q[0, :7]).rotation[:, 0]
+    return float(np.arctan2(ahead[1], ahead[0]))
 
 
 def _props(performance: Performance, held: bool) -> list[Prop]:

@@ -30,6 +30,8 @@ class Take:
     """Whether floor, walls and furniture surround the person; nothing does otherwise."""
     barrier: bool = False
     """Whether a thing stands between camera and person."""
+    facing: bool = False
+    """Whether the person faces the camera to begin with, as somebody does who is recorded."""
     moving_camera: bool = False
     """Whether the camera drifts as a hand or a robot lets it."""
     truncated: bool = False

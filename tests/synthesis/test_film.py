@@ -8,7 +8,7 @@ from kintrack.errors import SceneError
 from kintrack.geometry import invert_rigid, transform_points
 from kintrack.joints import JOINT_NAMES
 from synthesis.film import film
-from synthesis.render.filming import CLEAR_M, film_from
+from synthesis.render.filming import ASIDE_RAD, CLEAR_M, film_from
 from synthesis.scene import build_scene
 from synthesis.sensors.catalogue import SENSORS
 from synthesis.takes import Take
@@ -111,6 +111,15 @@ def test_a_camera_has_the_whole_person_in_view_from_a_distance(moving):
         inside = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
         assert inside.mean() > 0.96
         assert np.linalg.norm(points, axis=-1).min() > CLEAR_M - 0.35
+
+
+def test_a_camera_that_is_faced_stands_before_the_person():
+    camera = SENSORS["kinect_v2"]().camera
+    for seed in range(6):
+        T = film_from(walk(), camera, np.random.default_rng(seed), facing_rad=1.0)[0]
+        from_middle = T[:2, 3] - walk().mean(axis=(0, 1))[:2]
+        turned = np.arctan2(from_middle[1], from_middle[0]) - 1.0
+        assert abs(np.arctan2(np.sin(turned), np.cos(turned))) < ASIDE_RAD + 0.1
 
 
 def test_a_truncated_person_is_in_view_in_part():

@@ -81,6 +81,7 @@ def paper(seed: int, mocap: Path | None, frames: int | None = None) -> tuple[Tak
                     action=names[n % len(names)],
                     sensor="kinect_v2",
                     frames=length,
+                    facing=True,
                     held_out_things=part == "test",
                 )
             )

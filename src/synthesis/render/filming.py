@@ -16,6 +16,8 @@ DISTANCE_M = (1.6, 3.6)
 """Nearest and farthest place of a camera, from the middle of the motion [m]."""
 HEIGHT_M = (0.6, 1.9)
 """Lowest and highest camera [m]."""
+ASIDE_RAD = np.radians(50.0)
+"""How far aside a camera may stand that somebody faces [rad]."""
 CLEAR_M = 0.7
 """Least distance of the camera from any joint [m]."""
 INSIDE, INSIDE_TRUNCATED = 0.97, (0.4, 0.9)
@@ -30,6 +32,7 @@ def film_from(
     camera: PinholeCamera,
     rng: np.random.Generator,
     *,
+    facing_rad: float | None = None,
     moving: bool = False,
     truncated: bool = False,
     rate_hz: float = 30.0,
@@ -40,6 +43,7 @@ def film_from(
         joints_world: Joint centres through the motion [m], shape (N, J, 3).
         camera: The camera.
         rng: Draws place, direction and drift.
+        facing_rad: Where the camera stands, about z, but for `ASIDE_RAD`; anywhere if None.
         moving: Whether it drifts.
         truncated: Whether a part of the person shall be outside.
         rate_hz: Frames per second.
@@ -53,7 +57,10 @@ def film_from(
     middle = 0.5 * (joints_world.min(axis=(0, 1)) + joints_world.max(axis=(0, 1)))
     low, high = INSIDE_TRUNCATED if truncated else (INSIDE, 1.0)
     for n in range(ATTEMPTS):
-        azimuth = rng.uniform(-np.pi, np.pi)
+        if facing_rad is None:
+            azimuth = rng.uniform(-np.pi, np.pi)
+        else:
+            azimuth = facing_rad + rng.uniform(-ASIDE_RAD, ASIDE_RAD)
         spread = DISTANCE_M[1] - DISTANCE_M[0]
         distance = DISTANCE_M[0] + spread * rng.random() + 0.02 * n * (not truncated)
         place = middle + distance * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
