@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from kintrack.bench.cases import Case, make_occluded
 from kintrack.bench.digest import code_digest
 from kintrack.bench.methods import METHODS, Task
 from kintrack.errors import KintrackError
+from synthesis.workers import serve_parent
 
 CODE_FILE = "code.sha256"
 """Digest of the code that made a result, written beside it once it is finished."""
@@ -111,10 +111,10 @@ _frames_done: Synchronized[int] | None = None
 
 
 def _share(frames: Synchronized[int]) -> None:
-    """Start of a worker: where it counts frames; Ctrl-C is for the parent."""
+    """Start of a worker: where it counts frames."""
     global _frames_done
     _frames_done = frames
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    serve_parent()
 
 
 def _count() -> None:

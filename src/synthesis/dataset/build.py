@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass
@@ -19,6 +18,7 @@ from kintrack.result import write_json
 from synthesis.dataset.record import folder_of, is_recorded, partial_of, record
 from synthesis.sensors.catalogue import SENSORS
 from synthesis.takes import Take
+from synthesis.workers import serve_parent
 
 MANIFEST = "dataset.json"
 BYTES_PER_PIXEL = 1.3
@@ -88,7 +88,7 @@ def build_dataset(
         shutil.rmtree(partial_of(root, take), ignore_errors=True)
     ready = sum(take.frames for take in takes) - sum(take.frames for take in todo)
     count = max(1, min(workers or os.cpu_count() or 1, len(todo)))
-    pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_leave_signals_alone)
+    pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_start_worker)
     running: dict[Future[Path], Take] = {}
     waiting, done_frames, done_takes = list(reversed(todo)), ready, len(takes) - len(todo)
     try:
@@ -157,11 +157,11 @@ def _frames_in(partial: Path) -> int:
         return 0
 
 
-def _leave_signals_alone() -> None:
-    """Ctrl-C is for the parent, which then ends its workers; one thread each is enough."""
+def _start_worker() -> None:
+    """One thread each is enough."""
     import cv2
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    serve_parent()
     cv2.setNumThreads(1)
 
 
