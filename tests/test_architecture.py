@@ -50,6 +50,8 @@ HEAVY = {
     "segmentation/networks.py": {"torch"},
     "segmentation/loss.py": {"torch"},
     "segmentation/calibrate.py": {"torch"},
+    "segmentation/learner.py": {"torch"},
+    "segmentation/train.py": {"torch"},
     "segmentation/runtime.py": {"torch", "openvino"},
     "segmentation/graph.py": {"openvino"},
 }

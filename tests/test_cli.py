@@ -12,7 +12,18 @@ from kintrack.tracker import Tracker
 
 ROOT = Path(__file__).resolve().parents[1]
 DEMO = ROOT / "src" / "kintrack" / "demo"
-COMMANDS = ("fit", "view", "evaluate", "demo", "label", "occlude", "dataset", "bench", "model")
+COMMANDS = (
+    "fit",
+    "view",
+    "evaluate",
+    "demo",
+    "label",
+    "occlude",
+    "dataset",
+    "train",
+    "bench",
+    "model",
+)
 QUICK = ["--config.start.shape-coefficients", "0", "--config.start.rounds", "6"]
 
 

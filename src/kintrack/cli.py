@@ -16,6 +16,7 @@ from kintrack.commands.fit import Fit
 from kintrack.commands.label import Label
 from kintrack.commands.model import Model
 from kintrack.commands.occlude import Occlude
+from kintrack.commands.train import Train
 from kintrack.commands.view import View
 from kintrack.errors import KintrackError
 
@@ -24,7 +25,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point: exit code 0, 2 for a caller's mistake, 130 for Ctrl-C."""
     try:
         tyro.cli(
-            Fit | View | Evaluate | Demo | Label | Occlude | Dataset | Bench | Model,
+            Fit | View | Evaluate | Demo | Label | Occlude | Dataset | Train | Bench | Model,
             prog="kintrack",
             args=arguments,
         ).run()

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Zoom, shift, roll and mirroring of a picture, sampled at the network's size.
+
+Magnifying a picture is using a longer lens: depths stay, the focal length grows with the zoom, and
+the network's depth plane, metres per pixel, follows from both.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+from numba import njit
+from numpy import ndarray
+
+from segmentation.labels import IGNORED, INPUT_HEIGHT, INPUT_WIDTH, MIRRORED
+from segmentation.picture import Picture
+from segmentation.preprocess import letterbox
+
+WINDOWS = ((512, 424), (640, 480), (640, 576), (1280, 720))
+"""Images of usual cameras; all but the first leave bars in the network's picture."""
+
+
+@dataclass(frozen=True)
+class Warp:
+    """A similarity from the network's picture into a picture."""
+
+    zoom: float
+    """Network pixels per picture pixel."""
+    center: tuple[float, float]
+    """Picture point (u, v) that lands in the middle [px]."""
+    roll_rad: float = 0.0
+    """Turn of the camera about its axis."""
+    mirrored: bool = False
+    """Whether left and right are swapped."""
+    window: tuple[int, int] = (INPUT_WIDTH, INPUT_HEIGHT)
+    """Columns and rows in the middle that are not bar."""
+
+    @property
+    def matrix(self) -> Float[ndarray, "2 3"]:
+        """Maps network pixels (u, v, 1) to picture pixels."""
+        c, s = math.cos(self.roll_rad) / self.zoom, math.sin(self.roll_rad) / self.zoom
+        flip = -1.0 if self.mirrored else 1.0
+        A = np.array([[flip * c, -s], [flip * s, c]])
+        middle = 0.5 * np.array([INPUT_WIDTH - 1, INPUT_HEIGHT - 1])
+        return np.hstack([A, (np.array(self.center) - A @ middle)[:, None]])
+
+
+def whole(picture: Picture) -> Warp:
+    """The warp that shows a picture as `network_input` would."""
+    rows, columns = picture.depth_m.shape
+    zoom = min(INPUT_WIDTH / columns, INPUT_HEIGHT / rows)
+    window = max(1, round(columns * zoom)), max(1, round(rows * zoom))
+    return Warp(zoom, (0.5 * (columns - 1), 0.5 * (rows - 1)), window=window)
+
+
+def draw_warp(
+    picture: Picture,
+    rng: np.random.Generator,
+    zooms: tuple[float, float],
+    roll_deg: float,
+    at: tuple[float, float] | None = None,
+) -> Warp:
+    """Draw a view of a picture that stays inside of it as far as it can.
+
+    Args:
+        picture: The picture.
+        rng: Draws.
+        zooms: Least and greatest magnification.
+        roll_deg: Standard deviation of the roll [deg]; half of the views have none.
+        at: Point (u, v) that is looked at; any if None.
+    """
+    rows, columns = picture.depth_m.shape
+    zoom = math.exp(rng.uniform(math.log(zooms[0]), math.log(zooms[1])))
+    zoom *= min(INPUT_WIDTH / columns, INPUT_HEIGHT / rows)
+    shape = WINDOWS[rng.choice(len(WINDOWS), p=(0.5, 0.3, 0.1, 0.1))]
+    fit = letterbox(*shape)
+    aim = at or (rng.uniform(0, columns), rng.uniform(0, rows))
+    center = tuple(
+        float(np.clip(a, 0.5 * w, max(0.5 * w, n - 0.5 * w)) if w < n else 0.5 * n) - 0.5
+        for a, w, n in zip(aim, (fit.columns / zoom, fit.rows / zoom), (columns, rows), strict=True)
+    )
+    roll = math.radians(rng.normal(0.0, roll_deg)) if rng.random() < 0.5 else 0.0
+    return Warp(zoom, (center[0], center[1]), roll, bool(rng.random() < 0.5),
+                (fit.columns, fit.rows))  # fmt: skip
+
+
+def warped(
+    picture: Picture, warp: Warp, color_shift_px: tuple[float, float] = (0.0, 0.0)
+) -> Picture:
+    """The view as a picture of the network's size.
+
+    Four points a cell are looked up; a cell takes the lower median of their readings and the most
+    frequent label, the lowest of equals. What lies outside is a hole to be ignored.
+
+    Args:
+        picture: What is looked at.
+        warp: From where.
+        color_shift_px: By how much colour lies off depth [px].
+
+    Returns:
+        The view, shape (106, 128); `IGNORED` labels mark what has no content.
+    """
+    shape = (INPUT_HEIGHT, INPUT_WIDTH)
+    depth, labels = np.zeros(shape, np.float32), np.full(shape, IGNORED, np.uint8)
+    matrix = warp.matrix
+    swap = MIRRORED if warp.mirrored else np.arange(len(MIRRORED), dtype=np.uint8)
+    _warp(picture.depth_m, picture.labels, matrix, swap, *warp.window, depth, labels)
+    color: UInt8[ndarray, "106 128 3"] | None = None
+    if picture.color is not None:
+        matrix[:, 2] += color_shift_px
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        size = (INPUT_WIDTH, INPUT_HEIGHT)
+        color = np.asarray(
+            cv2.warpAffine(
+                picture.color, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE
+            )
+        )
+    return Picture(depth, color, labels, picture.focal_px * warp.zoom)
+
+
+@njit(cache=True)
+def _warp(depth, labels, M, swap, window_columns, window_rows, out, out_labels):
+    height, width = depth.shape
+    rows, columns = out.shape
+    left, top = (columns - window_columns) // 2, (rows - window_rows) // 2
+    readings = np.empty(4, dtype=np.float32)
+    seen = np.empty(4, dtype=np.uint8)
+    for i in range(top, top + window_rows):
+        for j in range(left, left + window_columns):
+            inside = n = 0
+            for k in range(4):
+                u, v = j - 0.25 + 0.5 * (k % 2), i - 0.25 + 0.5 * (k // 2)
+                x = int(np.floor(M[0, 0] * u + M[0, 1] * v + M[0, 2] + 0.5))
+                y = int(np.floor(M[1, 0] * u + M[1, 1] * v + M[1, 2] + 0.5))
+                if 0 <= x < width and 0 <= y < height:
+                    label = labels[y, x]
+                    seen[inside] = swap[label] if label < swap.size else label
+                    inside += 1
+                    if depth[y, x] > 0.0:
+                        at = n
+                        while at > 0 and readings[at - 1] > depth[y, x]:
+                            readings[at] = readings[at - 1]
+                            at -= 1
+                        readings[at] = depth[y, x]
+                        n += 1
+            if 2 * inside < 4:
+                continue
+            most = 0
+            for k in range(inside):
+                votes = 0
+                for m in range(inside):
+                    votes += seen[m] == seen[k]
+                if votes > most or (votes == most and seen[k] < out_labels[i, j]):
+                    most = votes
+                    out_labels[i, j] = seen[k]
+            if n > 0 and 2 * n >= inside:
+                out[i, j] = readings[(n - 1) // 2]
+            elif out_labels[i, j] != 255:
+                out_labels[i, j] = 0

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How well labels agree with the truth: confusion, intersection over union, pixel accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from numpy import ndarray
+
+from kintrack.errors import DatasetError
+from kintrack.sequence.frame import Frame
+from segmentation.labels import BACKGROUND, IGNORED, LABELS
+from segmentation.preprocess import HOLE, labels_to_network, network_input
+from segmentation.runtime import Segmenter
+
+N = len(LABELS)
+
+
+@dataclass(frozen=True)
+class Scores:
+    """What a confusion matrix says, each 0 to 1; NaN where neither truth nor labels have pixels."""
+
+    pixel_accuracy: float
+    """Share of pixels with the true label."""
+    background_iou: float
+    """Of the background."""
+    non_background_iou: float
+    """Person's pixels with the right part, over pixels that are person in truth or by label."""
+    person_iou: float
+    """The same if any part counts as right: of the person's mask."""
+    part_iou: dict[str, float]
+    """Of every part by name."""
+    mean_part_iou: float
+    """Mean of `part_iou`, absent parts left out."""
+
+    def summary(self) -> dict[str, Any]:
+        """All of it in one dict without nesting, NaN as None."""
+        flat = {
+            "pixel_accuracy": self.pixel_accuracy,
+            "background_iou": self.background_iou,
+            "non_background_iou": self.non_background_iou,
+            "person_iou": self.person_iou,
+            "mean_part_iou": self.mean_part_iou,
+            **self.part_iou,
+        }
+        return {k: round(v, 5) if np.isfinite(v) else None for k, v in flat.items()}
+
+
+def confusion(truth: UInt8[ndarray, "*n"], labels: UInt8[ndarray, "*n"]) -> Int[ndarray, "7 7"]:
+    """How many pixels of true label i got label j; `IGNORED` truth is left out.
+
+    Args:
+        truth: True labels.
+        labels: Labels to judge, same shape, 0 to 6.
+    """
+    counted = truth != IGNORED
+    pairs = truth[counted].astype(np.int64) * N + labels[counted]
+    return np.bincount(pairs, minlength=N * N).reshape(N, N)
+
+
+def iou_of(counts: Int[ndarray, "7 7"]) -> Float[ndarray, " 7"]:
+    """Intersection over union of every label; NaN for one that occurs nowhere."""
+    both = np.diag(counts).astype(float)
+    union = counts.sum(axis=0) + counts.sum(axis=1) - both
+    return np.asarray(np.divide(both, union, out=np.full(N, np.nan), where=union > 0))
+
+
+def scores_of(counts: Int[ndarray, "7 7"]) -> Scores:
+    """Scores of a confusion matrix, `counts[true, labelled]`."""
+    iou = iou_of(counts)
+    total, background = counts.sum(), counts[BACKGROUND, BACKGROUND]
+    right = np.trace(counts)
+    parts = dict(zip(LABELS[1:], iou[1:].tolist(), strict=True))
+    present = iou[1:][np.isfinite(iou[1:])]
+    return Scores(
+        pixel_accuracy=_share(right, total),
+        background_iou=float(iou[BACKGROUND]),
+        non_background_iou=_share(right - background, total - background),
+        person_iou=_share(counts[1:, 1:].sum(), total - background),
+        part_iou=parts,
+        mean_part_iou=float(present.mean()) if len(present) else float("nan"),
+    )
+
+
+def true_labels(frame: Frame) -> UInt8[ndarray, "106 128"]:
+    """The truth at the network's size; a cell without reading is background.
+
+    Raises:
+        DatasetError: if the frame has no labels or no depth.
+        InputError: if a label or a depth is not what it must be.
+    """
+    if frame.labels is None or frame.depth_m is None:
+        raise DatasetError(f"frame {frame.index} cannot be judged: {frame.problem or 'no labels'}")
+    truth = labels_to_network(frame.labels)
+    hole = network_input(frame.depth_m, frame.camera.fx)[3] == HOLE
+    return np.where(hole & (truth != IGNORED), np.uint8(BACKGROUND), truth)
+
+
+def evaluate(
+    segmenter: Segmenter,
+    sequences: Iterable[Iterable[Frame]],
+    on_frame: Callable[[int], None] = lambda done: None,
+) -> Int[ndarray, "7 7"]:
+    """Confusion matrix over all labelled frames of some recordings.
+
+    Args:
+        segmenter: What labels.
+        sequences: Recordings; frames without labels or depth are left out.
+        on_frame: Called with the number of frames judged.
+
+    Returns:
+        `counts[true, labelled]`; see `scores_of`.
+
+    Raises:
+        DatasetError: if no frame can be judged.
+    """
+    counts, done = np.zeros((N, N), dtype=np.int64), 0
+    for sequence in sequences:
+        for frame in sequence:
+            if frame.labels is None or frame.depth_m is None:
+                continue
+            counts += confusion(true_labels(frame), segmenter.segment(frame))
+            done += 1
+            on_frame(done)
+    if not done:
+        raise DatasetError("no frame with depth and labels in the recordings to evaluate on")
+    return counts
+
+
+def _share(part: int, whole: int) -> float:
+    return float(part / whole) if whole else float("nan")

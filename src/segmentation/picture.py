@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A frame reduced to 192 x 159, 1.5 times the network's size, so that a crop stays sharp."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+from numba import njit
+from numpy import ndarray
+
+from kintrack.errors import DatasetError
+from kintrack.sequence.frame import Frame
+from segmentation.labels import BACKGROUND, IGNORED, LABELS
+
+WIDTH, HEIGHT = 192, 159
+"""Largest picture [px]."""
+
+
+class Picture(NamedTuple):
+    """A small RGB-D picture with its labels."""
+
+    depth_m: Float[ndarray, "h w"]
+    """Depth along z [m], 0 = no reading."""
+    color: UInt8[ndarray, "h w 3"] | None
+    """R G B; None if there is none."""
+    labels: UInt8[ndarray, "h w"]
+    """Part labels; background where there is no reading."""
+    focal_px: float
+    """Focal length in its own pixels [px]."""
+
+
+def reduced(
+    depth_m: Float[ndarray, "h w"],
+    color: UInt8[ndarray, "h w 3"] | None,
+    labels: UInt8[ndarray, "h2 w2"],
+    focal_px: float,
+) -> Picture:
+    """A frame at the size in which it is packed.
+
+    Depth is a reading that was there, the lower median of a cell's; labels are a cell's most
+    frequent, as in `preprocess.py`. A frame smaller than a pack's pictures is kept as it is.
+
+    Args:
+        depth_m: Depth [m], finite, 0 = no reading, shape (h, w).
+        color: R G B of the same size, or None.
+        labels: 0 to 6 or `IGNORED`, in any size with that aspect.
+        focal_px: Focal length [px].
+    """
+    height, width = depth_m.shape
+    scale = min(WIDTH / width, HEIGHT / height, 1.0)
+    columns, rows = max(1, round(width * scale)), max(1, round(height * scale))
+    depth = np.zeros((rows, columns), dtype=np.float32)
+    votes = np.full((rows, columns), BACKGROUND, dtype=np.uint8)
+    _reduce(np.ascontiguousarray(depth_m, dtype=np.float32), labels, depth, votes)
+    if color is not None:
+        color = np.asarray(cv2.resize(color, (columns, rows), interpolation=cv2.INTER_AREA))
+    return Picture(depth, color, votes, focal_px * columns / width)
+
+
+def checked(frame: Frame, where: object) -> None:
+    """Pass if depth and labels of a frame are what they must be.
+
+    Raises:
+        DatasetError: if depth is negative or not finite, or a label is unknown.
+    """
+    assert frame.depth_m is not None and frame.labels is not None
+    wrong = ~(np.isfinite(frame.depth_m) & (frame.depth_m >= 0))
+    if wrong.any():
+        raise DatasetError(f"{where}, frame {frame.index}: depth = {frame.depth_m[wrong][0]} m; "
+                           "finite values are needed, 0 for no reading")  # fmt: skip
+    unknown = (frame.labels >= len(LABELS)) & (frame.labels != IGNORED)
+    if unknown.any():
+        raise DatasetError(f"{where}, frame {frame.index}: label {frame.labels[unknown][0]}; "
+                           f"0 to {len(LABELS) - 1} are known")  # fmt: skip
+
+
+@njit(cache=True)
+def _reduce(depth, labels, out, votes):
+    height, width = depth.shape
+    rows, columns = out.shape
+    tall, wide = labels.shape
+    side_v, side_u = height // rows + 2, width // columns + 2
+    found = np.empty(side_v * side_u, dtype=np.float32)
+    for i in range(rows):
+        v0, v1 = i * height // rows, max(i * height // rows + 1, (i + 1) * height // rows)
+        for j in range(columns):
+            u0, u1 = j * width // columns, max(j * width // columns + 1, (j + 1) * width // columns)
+            count = np.zeros(256, dtype=np.int64)
+            n = 0
+            for v in range(v0, v1):
+                for u in range(u0, u1):
+                    d = depth[v, u]
+                    if d > 0.0:
+                        found[n] = d
+                        n += 1
+                    count[
+                        labels[
+                            (2 * v + 1) * tall // (2 * height), (2 * u + 1) * wide // (2 * width)
+                        ]
+                    ] += 1
+            if n > 0 and 2 * n >= (v1 - v0) * (u1 - u0):
+                out[i, j] = np.sort(found[:n])[(n - 1) // 2]
+            best = 0
+            for label in range(1, 256):
+                if count[label] > count[best]:
+                    best = label
+            votes[i, j] = best if out[i, j] > 0.0 or best == 255 else 0
