@@ -10,7 +10,6 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.body import run_kinematics
-from kintrack.errors import SceneError
 from kintrack.geometry import PinholeCamera, invert_rigid, transform_points
 from kintrack.raster import rasterise
 from kintrack.skin import skinned_vertices
@@ -45,7 +44,7 @@ def barrier(
     T_world_camera: Float[ndarray, "4 4"],
     things: Mapping[str, Callable[[np.random.Generator], Thing]],
     rng: np.random.Generator,
-) -> Mesh:
+) -> Mesh | None:
     """Draw things and places until one hides a fair share of the person.
 
     Args:
@@ -57,10 +56,8 @@ def barrier(
         rng: Draws.
 
     Returns:
-        The thing in the world frame.
-
-    Raises:
-        SceneError: if no place was found.
+        The thing in the world frame; None if no place was found, as for a person who comes so near
+        that nothing fits before her.
     """
     T_camera_world = invert_rigid(T_world_camera)
     small = camera.scaled(STEP)
@@ -96,4 +93,4 @@ def barrier(
         other = np.where(np.isfinite(other), other, 0.0)
         if SHARE[0] <= np.mean([hidden_share(p, other) for p in persons]) <= SHARE[1]:
             return mesh
-    raise SceneError(f"no place in {ATTEMPTS} draws where a thing hides a fair share of the person")
+    return None

@@ -119,7 +119,8 @@ def build_scene(take: Take, mocap: Path | None = None) -> Scene:
         view = Ts_world_camera[0]
         standing.append(room(walls, keep_clear, view[:3, 3], view, things=around))
     if take.barrier:
-        standing.append(barrier(person, motion, sensor.camera, Ts_world_camera[0], before, place))
+        before_her = barrier(person, motion, sensor.camera, Ts_world_camera[0], before, place)
+        standing += [] if before_her is None else [before_her]
     return Scene(
         figure=figure,
         motion=motion,

@@ -29,7 +29,7 @@ class Take:
     room: bool = True
     """Whether floor, walls and furniture surround the person; nothing does otherwise."""
     barrier: bool = False
-    """Whether a thing stands between camera and person."""
+    """Whether a thing stands between camera and person, if there is room for one."""
     facing: bool = False
     """Whether the person faces the camera to begin with, as somebody does who is recorded."""
     moving_camera: bool = False

@@ -22,9 +22,9 @@ from synthesis.takes import Take
 class FilmingConfig:
     """What is timed."""
 
-    frames: int = 90
+    frames: int = 300
     """Frames of every take."""
-    takes: int = 4
+    takes: int = 2
     """Takes of each kind."""
     workers: int = 2
     """Processes."""
