@@ -122,7 +122,8 @@ def test_a_taken_port_is_named(viewer):
 
 def test_ctrl_c_ends_a_process_that_shows():
     program = (
-        "import time\n"
+        "import signal, time\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # even if it was ignored
         "from kintrack.skin import load_skin\n"
         "from kintrack.viewer import MeshcatViewer\n"
         "viewer = MeshcatViewer(load_skin())\n"
