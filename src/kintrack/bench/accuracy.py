@@ -22,7 +22,7 @@ from kintrack.errors import ConfigError, SequenceError
 from kintrack.evaluate import REFERENCE_FILE
 from kintrack.result import TRACK_FILE, make_result_folder, write_json
 from kintrack.sequence import open_sequence
-from synthesis.dataset.build import MANIFEST, build_dataset, sequences
+from synthesis.dataset.build import build_dataset, sequences
 from synthesis.dataset.recipes import takes_of
 from synthesis.occlusion.occlude import FACTS_FILE
 
@@ -216,7 +216,6 @@ def _content(
                     }
     return {
         "seed": config.seed,
-        "manifest": MANIFEST,
         "scores": scores,
         "not_made": {case.key: problem for case, problem in failed.items()},
     }

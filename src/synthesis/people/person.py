@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A person of the population, with the display skin, the soles and, if wanted, clothes."""
+"""A person of the population, with the display skin and the soles."""
 
 from __future__ import annotations
 
@@ -19,18 +19,11 @@ from kintrack.body import (
     run_kinematics,
 )
 from kintrack.geometry import invert_rigid
-from kintrack.skin import Skin, load_skin, skinned_vertices, vertex_normals
+from kintrack.skin import Skin, load_skin, skinned_vertices
 from synthesis.people.population import SIDES, Facts, Hands, load_population
 
 SOLE_HEIGHT_M = 0.012
 """How far above its lowest point a foot counts as sole [m]."""
-CLOTH_MIN_M, CLOTH_MAX_M = 0.005, 0.015
-"""Thinnest and thickest clothes [m]."""
-CLOTH_WAVE_M = (0.25, 0.60)
-"""Shortest and longest wave of the cloth's thickness [m]."""
-CLOTH_WAVES = 6
-BARE_LINKS = ("neck", "head", "l_hand", "r_hand", "l_foot", "r_foot")
-"""Links that clothes leave bare."""
 
 
 @dataclass(frozen=True)
@@ -104,34 +97,3 @@ def _rig(points: dict[str, Float[ndarray, " 3"]]) -> Rig:
         T = average.Ts_root_link[link]
         offsets[name] = points[name] - (T[:3, :3] @ frame.placement.translation + T[:3, 3])
     return Rig(average.link_names, Ts, offsets, average.explained)
-
-
-def dressed(person: Person, rng: np.random.Generator) -> Person:
-    """The person with clothes: the skin moved outwards by 5 to 15 mm, smoothly varying.
-
-    The thickness is a sum of plane waves over the bind pose, scaled to the range, and fades to
-    nothing over the neck, the wrists and the ankles with the skinning weights. Clothes turn with
-    the skin; they do not swing or fold.
-
-    Args:
-        person: The bare person.
-        rng: Draws the waves.
-
-    Returns:
-        The person in clothes; body and feet are unchanged.
-    """
-    skin = person.skin
-    Ts_root_link = person.rig.Ts_root_link[skin.links]  # (V, 4, 4, 4)
-    vertices = person.bind_vertices
-    directions = rng.normal(size=(CLOTH_WAVES, 3))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    lengths = rng.uniform(*CLOTH_WAVE_M, size=CLOTH_WAVES)
-    phases = rng.uniform(0.0, 2.0 * np.pi, size=CLOTH_WAVES)
-    waves = np.sin(2.0 * np.pi * vertices @ (directions / lengths[:, None]).T + phases).sum(axis=1)
-    share = (waves - waves.min()) / (waves.max() - waves.min())
-    bare = np.isin(skin.links, [skin.link_names.index(name) for name in BARE_LINKS])
-    covered = (skin.weights * ~bare).sum(axis=1)
-    thickness = covered * (CLOTH_MIN_M + (CLOTH_MAX_M - CLOTH_MIN_M) * share)
-    offset = thickness[:, None] * vertex_normals(vertices, skin.faces)
-    moved = skin.points_link + np.einsum("vbji,vj->vbi", Ts_root_link[..., :3, :3], offset)
-    return replace(person, skin=replace(skin, points_link=np.ascontiguousarray(moved)))
