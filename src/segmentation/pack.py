@@ -15,6 +15,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -36,8 +37,8 @@ HEADER = {"version": 2, "width": WIDTH, "height": HEIGHT, "depth_unit_m": DEPTH_
 HEADER_FILE, INDEX_FILE = "pack.json", "sequences.jsonl"
 FACTS = ("part", "person", "action", "sensor")
 """What is kept of a synthetic take's description."""
-READERS = 2
-"""Threads that decode images."""
+READERS = min(16, os.cpu_count() or 1)
+"""Threads that decode and reduce images."""
 
 
 class Planes(NamedTuple):
@@ -234,15 +235,9 @@ def _add(path: Path, name: str, folder: Path, start: int) -> Packed:
     fingerprint = _fingerprint(path)
     recording = cast(Recording, open_sequence(path))
     chosen = [n for n, files in enumerate(recording.files) if files.labels is not None]
-    pictures: list[Picture] = []
     with ThreadPoolExecutor(READERS) as pool:
-        for frame in pool.map(recording.frame, chosen):
-            if frame.depth_m is None:
-                _complain_of_labels(recording, frame)
-                continue
-            checked(frame, path)
-            assert frame.labels is not None
-            pictures.append(reduced(frame.depth_m, frame.color, frame.labels, recording.camera.fx))
+        read = pool.map(partial(_read, recording, path), chosen)
+        pictures = [one for one in read if one is not None]
     for plane, (shape, dtype) in ROW.items():
         rows = np.zeros((len(pictures), *shape), dtype)
         for row, one in zip(rows, pictures, strict=True):
@@ -272,6 +267,17 @@ def _add(path: Path, name: str, folder: Path, start: int) -> Packed:
     with (folder / INDEX_FILE).open("a", encoding="utf-8") as file:
         file.write(_line(entry))
     return entry
+
+
+def _read(recording: Recording, path: Path, number: int) -> Picture | None:
+    """A frame as it is packed; none if its depth is broken."""
+    frame = recording.frame(number)
+    if frame.depth_m is None:
+        _complain_of_labels(recording, frame)
+        return None
+    checked(frame, path)
+    assert frame.labels is not None
+    return reduced(frame.depth_m, frame.color, frame.labels, recording.camera.fx)
 
 
 def _is_person(labels: ndarray) -> ndarray:

@@ -77,34 +77,38 @@ def checked(frame: Frame, where: object) -> None:
                            f"0 to {len(LABELS) - 1} are known")  # fmt: skip
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _reduce(depth, labels, out, votes):
     height, width = depth.shape
     rows, columns = out.shape
     tall, wide = labels.shape
     side_v, side_u = height // rows + 2, width // columns + 2
     found = np.empty(side_v * side_u, dtype=np.float32)
+    count = np.empty(8, dtype=np.int64)
     for i in range(rows):
         v0, v1 = i * height // rows, max(i * height // rows + 1, (i + 1) * height // rows)
         for j in range(columns):
             u0, u1 = j * width // columns, max(j * width // columns + 1, (j + 1) * width // columns)
-            count = np.zeros(256, dtype=np.int64)
+            count[:] = 0
             n = 0
             for v in range(v0, v1):
+                y = (2 * v + 1) * tall // (2 * height)
                 for u in range(u0, u1):
+                    label = labels[y, (2 * u + 1) * wide // (2 * width)]
+                    count[min(label, 7)] += 1
                     d = depth[v, u]
                     if d > 0.0:
-                        found[n] = d
+                        k = n
+                        while k > 0 and found[k - 1] > d:
+                            found[k] = found[k - 1]
+                            k -= 1
+                        found[k] = d
                         n += 1
-                    count[
-                        labels[
-                            (2 * v + 1) * tall // (2 * height), (2 * u + 1) * wide // (2 * width)
-                        ]
-                    ] += 1
             if n > 0 and 2 * n >= (v1 - v0) * (u1 - u0):
-                out[i, j] = np.sort(found[:n])[(n - 1) // 2]
+                out[i, j] = found[(n - 1) // 2]
             best = 0
-            for label in range(1, 256):
+            for label in range(1, 8):
                 if count[label] > count[best]:
                     best = label
-            votes[i, j] = best if out[i, j] > 0.0 or best == 255 else 0
+            best = IGNORED if best == 7 else best
+            votes[i, j] = best if out[i, j] > 0.0 or best == IGNORED else BACKGROUND
