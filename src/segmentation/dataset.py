@@ -129,6 +129,23 @@ def _who(entry: Packed) -> str:
     return f"person {entry.facts['person']}" if "person" in entry.facts else entry.name
 
 
+class Shuffled:
+    """The endless row of epochs, each in an order of its own."""
+
+    def __init__(self, count: int, seed: int):
+        """Orders of `count` things, drawn by the seed."""
+        self._count, self._seed = count, seed
+        self._epoch, self._order = -1, np.zeros(0, dtype=np.int64)
+
+    def at(self, position: int) -> int:
+        """Which thing stands at a place."""
+        epoch, place = divmod(position, self._count)
+        if epoch != self._epoch:
+            rng = np.random.default_rng((self._seed, 2, epoch))
+            self._epoch, self._order = epoch, rng.permutation(self._count)
+        return int(self._order[place])
+
+
 @dataclass
 class Batches:
     """Batch by number, each a function of its number alone: of no worker and of no batch before.
@@ -155,21 +172,13 @@ class Batches:
         self, step: int
     ) -> tuple[Float[ndarray, "b 4 106 128"], UInt8[ndarray, "b 106 128"]]:
         samples = []
+        order = self.__dict__.setdefault("_order", Shuffled(len(self.pictures), self.seed))
         first = (step * self.world + self.rank) * self.batch
         for position in range(first, first + self.batch):
-            one = self.pictures[self._at(position)]
+            one = self.pictures[order.at(position)]
             if self.augment is None:
                 samples.append(plain_sample(one))
             else:
                 rng = np.random.default_rng((self.seed, 1, position))
                 samples.append(augmented(one, self.augment, self.bank, rng))
         return np.stack([s.image for s in samples]), np.stack([s.labels for s in samples])
-
-    def _at(self, position: int) -> int:
-        """Which picture stands at a place of the endless row of epochs."""
-        epoch, place = divmod(position, len(self.pictures))
-        order = self.__dict__.get("_order")
-        if order is None or order[0] != epoch:
-            rng = np.random.default_rng((self.seed, 2, epoch))
-            order = self.__dict__["_order"] = (epoch, rng.permutation(len(self.pictures)))
-        return int(order[1][place])

@@ -78,8 +78,9 @@ class Learner:
         if start is not None and start.config != config.network:
             raise WeightsError(f"weights of {start.config} cannot begin {config.network}")
         self.config, self.group = config, group
-        self.network = PartNetwork(config.network, config.seed)
-        self.average = PartNetwork(config.network, config.seed)
+        normalised = config.normalised and start is None
+        self.network = PartNetwork(config.network, config.seed, normalised)
+        self.average = PartNetwork(config.network, config.seed, normalised)
         if start is not None:
             for network in (self.network, self.average):
                 _load(network, start.tensors)
@@ -116,9 +117,7 @@ class Learner:
         self.optimiser.step()
         decay = min(self.config.average, (1.0 + step) / (10.0 + step))
         with torch.no_grad():
-            mean: list[Tensor] = [*self.average.parameters()]
-            now: list[Tensor] = [*self.network.parameters()]
-            torch._foreach_lerp_(mean, now, 1.0 - decay)
+            torch._foreach_lerp_(_floats(self.average), _floats(self.network), 1.0 - decay)
         return loss.detach()
 
     def judge(
@@ -169,6 +168,11 @@ def check_finite(loss: float, step: int) -> None:
             f"the loss is {loss} at step {step}: training has run away; take a lower --rate. The "
             "last checkpoint is from before"
         )
+
+
+def _floats(network: PartNetwork) -> list[Tensor]:
+    """Weights and running statistics."""
+    return [t for t in network.state_dict(keep_vars=True).values() if t.is_floating_point()]
 
 
 def _takes_bf16(config: TrainConfig, device: torch.device) -> bool:

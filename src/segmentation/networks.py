@@ -14,6 +14,8 @@ from torch import Tensor, nn
 from segmentation.architecture import HEAD, Layer, NetworkConfig, draw, plan
 from segmentation.weights import Weights
 
+NORM = "_norm"
+"""Ends the name of the normalisation that follows a layer."""
 HEAD_GAIN = 0.1
 """Spread of the first logits, so that training starts from nearly equal probabilities."""
 
@@ -21,22 +23,27 @@ HEAD_GAIN = 0.1
 class PartNetwork(nn.Module):
     """One of the three networks; its layers bear the names of the diagram.
 
-    There is no normalisation layer: He's initialisation keeps the second moment of the input,
-    which `preprocess.py` makes about 1, through all layers (He et al. 2015).
+    He's initialisation keeps the second moment of the input, which `preprocess.py` makes about 1,
+    through all layers (He et al. 2015). A network that is trained from random weights normalises
+    every layer but the last over the batch (Ioffe & Szegedy 2015); `folded` takes that out again,
+    so that what is kept and run has no layer beyond the diagram's.
     """
 
-    def __init__(self, config: NetworkConfig, seed: int | None = None):
+    def __init__(self, config: NetworkConfig, seed: int | None = None, normalised: bool = False):
         """Build with random weights.
 
         Args:
             config: Which network.
             seed: Makes the weights repeatable; None takes torch's own state.
+            normalised: Whether layers are followed by batch normalisation.
         """
         super().__init__()
         self.config = config
         generator = None if seed is None else torch.Generator().manual_seed(seed)
         for layer in plan(config).layers:
             self.add_module(layer.name, _module(layer, generator))
+            if normalised and layer.name != HEAD:
+                self.add_module(layer.name + NORM, nn.BatchNorm2d(layer.outputs))
 
     def forward(self, image: Float[Tensor, "b 4 106 128"]) -> Float[Tensor, "b 7 106 128"]:
         """Logits of every label at every pixel; `architecture.py` is the diagram."""
@@ -56,6 +63,32 @@ def tensors_of(network: PartNetwork) -> dict[str, np.ndarray]:
     return {name: tensor.detach().cpu().float().numpy().copy() for name, tensor in state.items()}
 
 
+def folded(network: PartNetwork) -> dict[str, np.ndarray]:
+    """Weights of the network without normalisation that computes the same in inference.
+
+    With scale g, shift b, mean m and variance v of a channel, w' = w g / sqrt(v + eps) and
+    c' = b + (c - m) g / sqrt(v + eps).
+    """
+    layers = dict(network.named_children())
+    out: dict[str, np.ndarray] = {}
+    for layer in plan(network.config).layers:
+        module, norm = layers[layer.name], layers.get(layer.name + NORM)
+        assert isinstance(module, nn.Conv2d | nn.ConvTranspose2d) and module.bias is not None
+        weight, bias = (t.detach().cpu().double() for t in (module.weight, module.bias))
+        if isinstance(norm, nn.BatchNorm2d):
+            mean, var, scale, shift = (
+                t.detach().cpu().double()
+                for t in (norm.running_mean, norm.running_var, norm.weight, norm.bias)
+                if t is not None
+            )
+            factor = scale / torch.sqrt(var + norm.eps)
+            weight = weight * factor.reshape((-1, 1, 1, 1) if layer.kind == "conv" else (-1, 1, 1))
+            bias = shift + (bias - mean) * factor
+        out[f"{layer.name}.weight"] = weight.float().numpy()
+        out[f"{layer.name}.bias"] = bias.float().numpy()
+    return out
+
+
 class TorchOperations:
     """The diagram's operations on torch tensors, with a network's weights."""
 
@@ -65,7 +98,7 @@ class TorchOperations:
 
     def conv(self, name: str, x: Tensor, width: int, relu: bool = True) -> Tensor:
         """See `Operations`."""
-        out = self._layers[name](x)
+        out = self._normalised(name, self._layers[name](x))
         return F.relu(out) if relu else out
 
     def pool(self, x: Tensor) -> Tensor:
@@ -74,7 +107,7 @@ class TorchOperations:
 
     def deconv(self, name: str, x: Tensor, width: int, like: Tensor, kernel: int = 4) -> Tensor:
         """See `Operations`."""
-        return self._layers[name](x, output_size=like.shape[-2:])
+        return self._normalised(name, self._layers[name](x, output_size=like.shape[-2:]))
 
     def join(self, a: Tensor, b: Tensor) -> Tensor:
         """See `Operations`."""
@@ -83,6 +116,10 @@ class TorchOperations:
     def add(self, name: str, a: Tensor, b: Tensor) -> Tensor:
         """See `Operations`."""
         return F.relu(a + b)
+
+    def _normalised(self, name: str, x: Tensor) -> Tensor:
+        norm = self._layers.get(name + NORM)
+        return x if norm is None else norm(x)
 
 
 def _module(layer: Layer, generator: torch.Generator | None) -> nn.Module:

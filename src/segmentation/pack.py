@@ -12,10 +12,10 @@ from __future__ import annotations
 import json
 import os
 import zlib
+from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
@@ -38,7 +38,7 @@ HEADER_FILE, INDEX_FILE = "pack.json", "sequences.jsonl"
 FACTS = ("part", "person", "action", "sensor")
 """What is kept of a synthetic take's description."""
 READERS = min(16, os.cpu_count() or 1)
-"""Threads that decode and reduce images."""
+"""Recordings that are decoded and reduced at a time."""
 
 
 class Planes(NamedTuple):
@@ -127,8 +127,8 @@ def pack(
         _cut(folder, done, start)
         write_json(folder / HEADER_FILE, {**HEADER, "source": root.name})
         on_progress(len(done), len(sources))
-        for path in sources[len(done) :]:
-            done.append(_add(path, _name(path, root), folder, start))
+        for path, recording in _read_ahead(sources[len(done) :]):
+            done.append(_add(recording, path, _name(path, root), folder, start))
             start += done[-1].frames
             on_progress(len(done), len(sources))
     except OSError as error:
@@ -230,14 +230,45 @@ def _line(entry: Packed) -> str:
     return json.dumps(asdict(entry)) + "\n"
 
 
-def _add(path: Path, name: str, folder: Path, start: int) -> Packed:
-    """Pack one recording behind the others."""
+class Reduced(NamedTuple):
+    """A recording as it is packed."""
+
+    fingerprint: str
+    """Of the recording before it was read."""
+    pictures: list[Picture]
+    """Its usable frames."""
+    skipped: int
+    """Frames without labels or with broken depth."""
+
+
+def _read_ahead(paths: list[Path]) -> Iterator[tuple[Path, Reduced]]:
+    """Recordings in order, some of them read before they are asked for."""
+    with ThreadPoolExecutor(READERS) as pool:
+        waiting: deque[Future[Reduced]] = deque()
+        for n, path in enumerate(paths):
+            while len(waiting) < min(2 * READERS, len(paths) - n):
+                waiting.append(pool.submit(_reduced, paths[n + len(waiting)]))
+            try:
+                yield path, waiting.popleft().result()
+            except BaseException:
+                pool.shutdown(cancel_futures=True)
+                raise
+
+
+def _reduced(path: Path) -> Reduced:
     fingerprint = _fingerprint(path)
     recording = cast(Recording, open_sequence(path))
-    chosen = [n for n, files in enumerate(recording.files) if files.labels is not None]
-    with ThreadPoolExecutor(READERS) as pool:
-        read = pool.map(partial(_read, recording, path), chosen)
-        pictures = [one for one in read if one is not None]
+    pictures = []
+    for number, files in enumerate(recording.files):
+        if files.labels is not None:
+            one = _read(recording, path, number)
+            pictures += [] if one is None else [one]
+    return Reduced(fingerprint, pictures, len(recording) - len(pictures))
+
+
+def _add(recording: Reduced, path: Path, name: str, folder: Path, start: int) -> Packed:
+    """Pack one recording behind the others."""
+    pictures = recording.pictures
     for plane, (shape, dtype) in ROW.items():
         rows = np.zeros((len(pictures), *shape), dtype)
         for row, one in zip(rows, pictures, strict=True):
@@ -253,7 +284,7 @@ def _add(path: Path, name: str, folder: Path, start: int) -> Packed:
     height, width = pictures[0].depth_m.shape if pictures else (0, 0)
     entry = Packed(
         name=name,
-        fingerprint=fingerprint,
+        fingerprint=recording.fingerprint,
         start=start,
         frames=len(pictures),
         columns=width,
@@ -261,7 +292,7 @@ def _add(path: Path, name: str, folder: Path, start: int) -> Packed:
         focal_px=pictures[0].focal_px if pictures else 0.0,
         colored=tuple(one.color is not None for one in pictures),
         person_shares=tuple(round(float(_is_person(one.labels).mean()), 5) for one in pictures),
-        skipped=len(recording) - len(pictures),
+        skipped=recording.skipped,
         facts=_facts(path),
     )
     with (folder / INDEX_FILE).open("a", encoding="utf-8") as file:

@@ -12,6 +12,7 @@ import json
 import signal
 import threading
 import time
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -33,7 +34,8 @@ from segmentation.dataset import Batches, Pictures, Split
 from segmentation.errors import SegmentationError
 from segmentation.evaluate import N, Scores, scores_of
 from segmentation.learner import Group, Learner, check_finite, join_group
-from segmentation.networks import tensors_of
+from segmentation.networks import folded
+from segmentation.prepared import Prepared, PreparedBatches
 from segmentation.training_config import TrainConfig
 from segmentation.weights import Weights, save_weights
 
@@ -81,6 +83,7 @@ def train(
     output: Path,
     facts: dict[str, Any] | None = None,
     start: Weights | None = None,
+    prepared: Prepared | None = None,
     on_progress: Callable[[TrainProgress], None] = lambda progress: None,
 ) -> Path:
     """Train a network, or go on where the run in the folder stopped.
@@ -92,6 +95,7 @@ def train(
         output: Folder of the run.
         facts: What the weights file is to say beyond config and scores: data, command.
         start: Weights to begin with; random ones if None.
+        prepared: Samples to learn from; None makes them anew for each step.
         on_progress: Called after every step, in the leading process.
 
     Returns:
@@ -104,17 +108,21 @@ def train(
     """
     group = join_group(config)
     learner = Learner(config, group, start)
-    identity = {"config": config.identity(), "data": [data.train.crc(), data.validation.crc()]}
+    identity = {
+        "config": config.identity(),
+        "data": [data.train.crc(), data.validation.crc()],
+        "start": None if start is None else _crc(start),
+    }
     run = _resume(output, learner, identity)
     if group.leads:
         output.mkdir(parents=True, exist_ok=True)
         write_json(output / RUN_FILE, {**asdict(config), "facts": facts or {}})
-    _loop(config, learner, run, data, bank, output, identity, on_progress)
+    _loop(config, learner, run, data, bank, prepared, output, identity, on_progress)
     path = output / WEIGHTS_FILE
     if group.leads:
         run.scores = validate(learner, data.validation.spread(config.validation_frames))
         _keep(output, learner, run, identity)
-        weights = Weights(config.network, tensors_of(learner.average))
+        weights = Weights(config.network, folded(learner.average))
         weights = calibrated(weights, _calibration(config, data.train, bank))
         shown = _facts(config, data, run, facts or {}, learner)
         save_weights(path, Weights(weights.config, weights.tensors, weights.ranges, shown))
@@ -140,10 +148,14 @@ def validate(learner: Learner, pictures: Pictures) -> Scores:
     return scores_of(counts)
 
 
-def _loop(config, learner, run, data, bank, output, identity, on_progress) -> None:
+def _loop(config, learner, run, data, bank, prepared, output, identity, on_progress) -> None:
     group, validation = learner.group, data.validation.spread(config.validation_frames)
-    batches = Batches(data.train, config.augment, bank, config.batch // group.world, config.seed,
-                      group.rank, group.world)  # fmt: skip
+    share_of_batch = (config.batch // group.world, config.seed, group.rank, group.world)
+    batches = (
+        PreparedBatches(prepared, *share_of_batch)
+        if prepared
+        else Batches(data.train, config.augment, bank, *share_of_batch)
+    )
     began, saved = time.monotonic() - run.elapsed_s, time.monotonic()
     with _stop_signals() as stopped:
         for images, labels in _loader(config, batches, run.step, group):
@@ -208,6 +220,14 @@ def _keep(output: Path, learner: Learner, run: Run, identity: dict[str, Any]) ->
     save_checkpoint(output, Checkpoint(run.step, learner.tensors(), facts))
 
 
+def _crc(weights: Weights) -> str:
+    """Tells these weights from others."""
+    crc = 0
+    for name in sorted(weights.tensors):
+        crc = zlib.crc32(np.ascontiguousarray(weights.tensors[name]).tobytes(), crc)
+    return f"weights {crc:08x}"
+
+
 def _plain(value: Any) -> Any:
     """As it comes back from JSON."""
     return json.loads(json.dumps(value))
@@ -221,7 +241,9 @@ def _difference(key: str, theirs: Any, ours: Any) -> str:
     return ", ".join(f"its {name} is {theirs.get(name)}, not {ours[name]}" for name in names)
 
 
-def _loader(config: TrainConfig, batches: Batches, first: int, group: Group) -> DataLoader:
+def _loader(
+    config: TrainConfig, batches: Batches | PreparedBatches, first: int, group: Group
+) -> DataLoader:
     """Batches from a step on, prepared ahead by other processes."""
     return DataLoader(
         batches,  # type: ignore[arg-type]

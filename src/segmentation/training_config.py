@@ -47,12 +47,19 @@ class TrainConfig:
     """lambda of the background modifier."""
     average: float = 0.999
     """Decay of the moving average of the weights, which is what is kept."""
+    normalised: bool = True
+    """Batch normalisation while training, folded into the weights that are kept; never where
+    training begins with weights."""
     seed: int = 0
     """Draws weights, order and changes."""
     augment: AugmentConfig = field(default_factory=AugmentConfig)
     """How samples are changed."""
     bank: BankConfig = field(default_factory=BankConfig)
     """Things and rooms that are put into them."""
+    prepared: int = 0
+    """Samples that are made once and learnt from many times, mirrored by chance, where a GPU
+    outruns the processor or runs share them (110 kB each in the cache); 0 makes every sample
+    anew."""
     validation_share: float = 0.05
     """Share of people, or of recordings, that validate."""
     validation_part: str = "test"
@@ -80,9 +87,9 @@ class TrainConfig:
             steps=(0, 10**8), hours=(1e-4, 1e4), batch=(1, 4096), rate=(1e-8, 1.0),
             final_rate=(0.0, 1.0), warmup_steps=(0, 10**6), weight_decay=(0.0, 1.0),
             clip=(1e-6, 1e6), background_weight=(0.0, 100.0), average=(0.0, 0.99999),
-            seed=(0, 2**31), validation_share=(0.0, 0.9), validation_frames=(1, 10**6),
-            validation_steps=(1, 10**8), log_steps=(1, 10**6), checkpoint_minutes=(0.0, 1e4),
-            threads=(0, 1024), workers=(0, 64),
+            seed=(0, 2**31), prepared=(0, 10**8), validation_share=(0.0, 0.9),
+            validation_frames=(1, 10**6), validation_steps=(1, 10**8), log_steps=(1, 10**6),
+            checkpoint_minutes=(0.0, 1e4), threads=(0, 1024), workers=(0, 64),
         )  # fmt: skip
         for name, allowed in (
             ("precision", PRECISIONS),

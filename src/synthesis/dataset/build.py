@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
+from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 
 import kintrack
@@ -88,7 +89,10 @@ def build_dataset(
         shutil.rmtree(partial_of(root, take), ignore_errors=True)
     ready = sum(take.frames for take in takes) - sum(take.frames for take in todo)
     count = max(1, min(workers or os.cpu_count() or 1, len(todo)))
-    pool = ProcessPoolExecutor(count, get_context("spawn"), initializer=_start_worker)
+    context = get_context("spawn")
+    pool = ProcessPoolExecutor(
+        count, context, initializer=_start_worker, initargs=(context.Value("i", 0),)
+    )
     running: dict[Future[Path], Take] = {}
     waiting, done_frames, done_takes = list(reversed(todo)), ready, len(takes) - len(todo)
     try:
@@ -157,12 +161,18 @@ def _frames_in(partial: Path) -> int:
         return 0
 
 
-def _start_worker() -> None:
-    """One thread each is enough."""
+def _start_worker(started: Synchronized[int]) -> None:
+    """One core each; the ray tracer would start as many threads in each as there are cores."""
     import cv2
 
     serve_parent()
     cv2.setNumThreads(1)
+    with started.get_lock():
+        number = started.value
+        started.value += 1
+    if hasattr(os, "sched_setaffinity"):
+        cores = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {cores[number % len(cores)]})
 
 
 def _stop(pool: ProcessPoolExecutor) -> None:

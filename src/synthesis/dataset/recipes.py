@@ -32,8 +32,10 @@ WITH_OBJECTS = (
     "sitting_down_and_rising",
 )
 """The seven recordings with objects."""
-TRAINING_FRAMES, TRAINING_STRIDE = 20, 6
+TRAINING_FRAMES, TRAINING_STRIDE = 10, 10
 """Length of a training take [frames], motion frames per recorded one."""
+TRAINING_TOTAL = 12_000
+"""Frames altogether, unless told otherwise."""
 TRAINING_SENSORS = {
     "kinect_v2": 0.25,
     "kinect_v2_far": 0.25,
@@ -94,9 +96,9 @@ def training(seed: int, mocap: Path | None, frames: int | None = None) -> tuple[
     Args:
         seed: Draws all.
         mocap: Folder of motion capture clips; authored motions only if None.
-        frames: Frames altogether, rounded up to whole takes; 30,000 if None.
+        frames: Frames altogether, rounded up to whole takes; `TRAINING_TOTAL` if None.
     """
-    total = 30_000 if frames is None else frames
+    total = TRAINING_TOTAL if frames is None else frames
     rng = np.random.default_rng((seed, 2))
     clips = training_clips(mocap, TRAINING_FRAMES * TRAINING_STRIDE)
     sensors, shares = list(TRAINING_SENSORS), list(TRAINING_SENSORS.values())

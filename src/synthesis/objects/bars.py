@@ -95,7 +95,7 @@ def tube(
     path = np.asarray(path, dtype=float)
     radii = np.broadcast_to(np.asarray(radius, dtype=float), len(path))
     ways = np.gradient(path, axis=0)
-    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
     side = _across(ways)
     t = (np.arange(sides) + 0.5) * 2 * np.pi / sides
     rings = []

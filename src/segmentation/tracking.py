@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Segmenters as the tracker wants them: labels that cover the image, without the picture's bars."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import UInt8
+from numpy import ndarray
+
+from kintrack.sequence.frame import Frame
+from segmentation.evaluate import true_labels
+from segmentation.labels import BACKGROUND, IGNORED
+from segmentation.preprocess import letterbox
+from segmentation.runtime import Segmenter
+
+
+@dataclass(frozen=True)
+class ImageSegmenter:
+    """A network whose labels cover the image (`kintrack.segmenter.Segmenter`)."""
+
+    network: Segmenter
+    """Labels the network's picture."""
+
+    def segment(self, frame: Frame) -> UInt8[ndarray, "r c"]:
+        """The labels of the cells that lie in the image.
+
+        Raises:
+            InputError: if the frame has no depth or a broken one.
+        """
+        return inside_bars(self.network.segment(frame), frame)
+
+
+@dataclass(frozen=True)
+class TrueSegmenter:
+    """The labels that came with the recording, at the network's size: the ceiling of any network.
+
+    A frame without labels shows nobody.
+    """
+
+    def segment(self, frame: Frame) -> UInt8[ndarray, "r c"]:
+        """True labels of the cells that lie in the image."""
+        if frame.labels is None:
+            fit = letterbox(frame.camera.width, frame.camera.height)
+            return np.zeros((fit.rows, fit.columns), dtype=np.uint8)
+        labels = inside_bars(true_labels(frame), frame)
+        return np.where(labels == IGNORED, np.uint8(BACKGROUND), labels)
+
+
+def inside_bars(labels: UInt8[ndarray, "106 128"], frame: Frame) -> UInt8[ndarray, "r c"]:
+    """The part of the network's picture that the frame's image fills."""
+    fit = letterbox(frame.camera.width, frame.camera.height)
+    return labels[fit.top : fit.top + fit.rows, fit.left : fit.left + fit.columns]
