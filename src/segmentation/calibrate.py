@@ -72,20 +72,26 @@ class Observer:
         return Named(value, name)
 
 
-def calibrated(weights: Weights, inputs: Iterable[Float[ndarray, "4 106 128"]]) -> Weights:
+def calibrated(
+    weights: Weights,
+    inputs: Iterable[Float[ndarray, "4 106 128"]],
+    device: torch.device | None = None,
+) -> Weights:
     """The same weights with int8 ranges.
 
     Args:
         weights: A trained network.
         inputs: Some hundred network inputs of training frames; they are gone through twice.
+        device: What computes; the processor if None.
 
     Raises:
         SegmentationError: if there are no inputs.
     """
-    images = [torch.from_numpy(np.ascontiguousarray(x))[None] for x in inputs]
+    device = device or torch.device("cpu")
+    images = [torch.from_numpy(np.ascontiguousarray(x))[None].to(device) for x in inputs]
     if not images:
         raise SegmentationError("calibration needs at least one frame, there is none")
-    network = network_of(weights)
+    network = network_of(weights).to(device)
     lows: dict[str, float] = {}
     highs: dict[str, float] = {}
 
@@ -103,7 +109,7 @@ def calibrated(weights: Weights, inputs: Iterable[Float[ndarray, "4 106 128"]]) 
     def see_all(name: str, value: Tensor) -> None:
         key = group.get(name, name)
         magnitudes = value[value != 0].abs()
-        counts[key] += torch.histc(magnitudes, BINS, 0.0, most[key]).numpy()
+        counts[key] += torch.histc(magnitudes, BINS, 0.0, most[key]).cpu().numpy()
 
     _observe(network, images, see_all)
     signed = {group.get(name, name) for name, low in lows.items() if low < 0}

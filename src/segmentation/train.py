@@ -123,7 +123,7 @@ def train(
         run.scores = validate(learner, data.validation.spread(config.validation_frames))
         _keep(output, learner, run, identity)
         weights = Weights(config.network, folded(learner.average))
-        weights = calibrated(weights, _calibration(config, data.train, bank))
+        weights = calibrated(weights, _calibration(config, data.train, bank), group.device)
         shown = _facts(config, data, run, facts or {}, learner)
         save_weights(path, Weights(weights.config, weights.tensors, weights.ranges, shown))
         draw_curves(read_log(output / LOG_FILE), output / CURVES_FILE)

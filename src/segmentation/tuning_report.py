@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, UInt8
 from numpy import ndarray
 
 from kintrack.export import PART_COLORS, contact_sheet
@@ -25,7 +26,11 @@ MOST_BARS = 30
 """Recordings in the picture, at most."""
 
 RECORDING_HEADER = ("recording", "person", "used to", "frames", "kept", "dropped for")
-SCORE_HEADER = ("IoU [%]", "pictures", "weights", "all parts", "background", "person", *LABELS[1:])
+SCORED = {"non_background_iou": "all parts", "background_iou": "background",
+          "person_iou": "person's outline", **{label: label for label in LABELS[1:]}}  # fmt: skip
+"""Scores of the tables by what they are called there."""
+TILE_PX = 180
+"""Side of a picture's tile [px]."""
 
 
 def write_report(folder: Path, content: Mapping[str, Any], shown: Sequence[Shown]) -> list[Path]:
@@ -81,18 +86,25 @@ def recording_rows(content: Mapping[str, Any]) -> list[tuple[str, ...]]:
     return [*rows, ("all", "", "", str(total[0]), str(total[1]), "")]
 
 
+def score_header(content: Mapping[str, Any]) -> tuple[str, ...]:
+    """Titles over `score_rows`."""
+    titles = (f"{one['condition']} ({one['pictures']})" for one in content["scores"])
+    return ("IoU [%], before > after", *titles)
+
+
 def score_rows(content: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """Cells of the scores' table, under `SCORE_HEADER`: before, after and the change."""
-    keys = ("non_background_iou", "background_iou", "person_iou", *LABELS[1:])
-    rows = []
-    for one in content["scores"]:
-        before, after = one["start"], one["tuned"]
-        rows.append((one["condition"], str(one["pictures"]), "before",
-                     *(_percent(before[key]) for key in keys)))  # fmt: skip
-        rows.append(("", "", "after", *(_percent(after[key]) for key in keys)))
-        changes = [None if None in (before[k], after[k]) else after[k] - before[k] for k in keys]
-        rows.append(("", "", "change", *(_percent(change, "+") for change in changes)))
-    return rows
+    """Cells of the scores' table: a row per score, a column per condition."""
+
+    def cell(one: Mapping[str, Any], key: str) -> str:
+        before, after = one["start"][key], one["tuned"][key]
+        if None in (before, after):
+            return f"{_percent(before)} > {_percent(after)}"
+        return f"{_percent(before)} > {_percent(after)} ({_percent(after - before, '+')})"
+
+    return [
+        (name.replace("_", " "), *(cell(one, key) for one in content["scores"]))
+        for key, name in SCORED.items()
+    ]
 
 
 ABOUT_DROPS = """A frame is dropped where the tracker's fit does not explain it. The reasons of
@@ -112,7 +124,7 @@ def text_of(content: Mapping[str, Any]) -> str:
     lines += ["", ABOUT_DROPS, "", "## Scores", ""]
     lines += [f"Held out by {division['by']}.", "", ABOUT_SCORES, ""]
     lines += [f"Caution: {division['caution']}.", ""] if division["caution"] else []
-    return "\n".join([*lines, *_markdown(SCORE_HEADER, score_rows(content)), ""])
+    return "\n".join([*lines, *_markdown(score_header(content), score_rows(content)), ""])
 
 
 def draw(content: Mapping[str, Any], shown: Sequence[Shown], path: Path) -> None:
@@ -129,10 +141,12 @@ def draw(content: Mapping[str, Any], shown: Sequence[Shown], path: Path) -> None
     _draw_scores(figure.add_subplot(grid[0, 1]), content["scores"])
     below = figure.add_subplot(grid[1, :])
     below.imshow(sheet, interpolation="nearest")
-    below.set_axis_off()
-    kinds = ", ".join(dict.fromkeys(one.condition for one in shown))
-    title = f"depth, the tracker's labels, labels before and after ({kinds})"
-    below.set_title(title, fontsize=9)
+    below.set(xticks=[], yticks=[(n + 0.5) * TILE_PX for n in range(0, -(-len(shown) // 2))])
+    names = [one.condition.replace(" ", "\n", 1) for one in shown[::2]]
+    below.set_yticklabels(names, fontsize=7)
+    below.tick_params(length=0)
+    below.set_title("held out: depth, the tracker's labels, labels before, labels after; twice",
+                    fontsize=9)  # fmt: skip
     figure.savefig(path, dpi=110, metadata={"Software": None})
 
 
@@ -150,7 +164,7 @@ def _draw_kept(axes, recordings) -> None:
     axes.invert_yaxis()
     axes.tick_params(axis="y", labelsize=6)
     axes.set_xlabel("frames", fontsize=8)
-    axes.legend(fontsize=6)
+    axes.legend(fontsize=6, ncols=3, loc="lower left", bbox_to_anchor=(0.0, 1.0))
 
 
 def _draw_scores(axes, scores) -> None:
@@ -164,22 +178,40 @@ def _draw_scores(axes, scores) -> None:
                      label=f"{one['condition']}, {'before' if k == 0 else 'after'}")  # fmt: skip
     names = ["all parts", *(label.replace("_", "\n") for label in LABELS[1:])]
     axes.set_xticks(range(len(keys)), names, fontsize=7)
-    axes.set(ylabel="IoU [%]", ylim=(0, 100))
+    axes.set(ylabel="IoU [%]", ylim=(0, 118), yticks=range(0, 101, 20))
     axes.grid(axis="y", alpha=0.3)
-    axes.legend(fontsize=6, ncols=2, loc="lower right")
+    axes.legend(fontsize=6, ncols=min(len(scores), 4), loc="upper center")
 
 
 def _sheet(shown: Sequence[Shown]) -> UInt8[ndarray, "h w 3"]:
-    """Depth, truth, before and after of each picture; two pictures a row."""
+    """Depth, truth, before and after around the person; two pictures a row."""
     tiles = []
     for one in shown:
         plane = one.sample.image[3]
         depth = np.where(plane >= HOLE, 0.0, REFERENCE_DEPTH_M * np.exp(DEPTH_SCALE * plane))
-        tiles.append(depth_picture(depth, depth_range(depth)))
-        tiles += [_painted(tiles[-1], labels) for labels in
-                  (one.sample.labels, one.start, one.tuned)]  # fmt: skip
-    big = [tile.repeat(2, axis=0).repeat(2, axis=1) for tile in tiles]
-    return contact_sheet(big, 8)
+        picture = depth_picture(depth, depth_range(depth))
+        box = _around(_on(one.sample.labels))
+        for labels in (None, one.sample.labels, one.start, one.tuned):
+            whole = picture if labels is None else _painted(picture, labels)
+            size = (TILE_PX - 4, TILE_PX - 4)  # the sheet parts tiles by 4 px
+            tiles.append(np.asarray(cv2.resize(whole[box], size, interpolation=cv2.INTER_NEAREST)))
+    return contact_sheet(tiles, 8)
+
+
+def _around(mask: Bool[ndarray, "h w"]) -> tuple[slice, slice]:
+    """A square around a mask with some margin, as far as the picture goes."""
+    rows, columns = np.nonzero(mask) if mask.any() else np.nonzero(~mask)
+    side = min(max(int(1.35 * max(np.ptp(rows), np.ptp(columns))), 24), *mask.shape)
+    spans = []
+    for places, size in ((rows, mask.shape[0]), (columns, mask.shape[1])):
+        first = (int(places.min()) + int(places.max()) - side) // 2
+        first = min(max(first, 0), size - side)
+        spans.append(slice(first, first + side))
+    return spans[0], spans[1]
+
+
+def _on(labels: UInt8[ndarray, "h w"]) -> Bool[ndarray, "h w"]:
+    return np.asarray((labels != BACKGROUND) & (labels != IGNORED))
 
 
 def _painted(
@@ -187,7 +219,7 @@ def _painted(
 ) -> UInt8[ndarray, "h w 3"]:
     """Label colours over depth."""
     out = picture.astype(float)
-    on = (labels != BACKGROUND) & (labels != IGNORED)
+    on = _on(labels)
     out[on] += 0.75 * (PART_COLORS[labels[on]] - out[on])
     return out.astype(np.uint8)
 

@@ -14,6 +14,11 @@ from rich.table import Table
 from kintrack.bench.accuracy import RESULT_FILE, AccuracyConfig, run_accuracy
 from kintrack.bench.figure import write_pictures
 from kintrack.bench.filming import FilmingConfig, run_filming
+from kintrack.bench.segmentation import figure as segmentation_figure
+from kintrack.bench.segmentation import run as segmentation_run
+from kintrack.bench.segmentation import tables as segmentation_tables
+from kintrack.bench.segmentation.config import SegmentationBenchConfig, named_weights
+from kintrack.bench.segmentation.inputs import Inputs
 from kintrack.commands.console import StepProgress, console
 
 
@@ -64,12 +69,48 @@ class BenchFilming:
 
 
 @dataclass(frozen=True)
+class BenchSegmentation:
+    """Networks on held-out and real recordings, and their runtimes: tables, pictures, a JSON."""
+
+    weights: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=FILE ...")]
+    """Networks to compare, the one that ships first."""
+    output: Path = Path("kintrack-bench-segmentation")
+    """Folder for recordings, results and scores; a stopped bench goes on there."""
+    dataset: Path | None = None
+    """Dataset of the recipe `paper`; its test part is made if not given."""
+    mocap: Path | None = None
+    """Folder of motion capture clips for that; authored motions only if not given."""
+    data: Path | None = None
+    """Folder with the real recordings (utd_mhad, scenes, uva_turn, bonn_tablet, bonn_three,
+    sofa); synthetic people only if not given."""
+    config: Annotated[SegmentationBenchConfig, tyro.conf.OmitArgPrefixes] = field(
+        default_factory=SegmentationBenchConfig
+    )
+    """How much is measured."""
+
+    def run(self) -> None:
+        """Run with progress, print the tables, draw the pictures."""
+        inputs = Inputs(self.dataset, self.mocap, self.data)
+        with StepProgress() as progress:
+            bench = segmentation_run.run_segmentation(
+                self.output, named_weights(self.weights), self.config, inputs, progress
+            )
+        print_grids(bench.content)
+        pictures = segmentation_figure.write_pictures(
+            bench.content, bench.networks, bench.judged, self.output
+        )
+        written = [self.output / segmentation_run.RESULT_FILE, *pictures]
+        console.print(f"written: {', '.join(map(str, written))}")
+
+
+@dataclass(frozen=True)
 class Bench:
     """Measure on held-out people, motions and objects."""
 
     what: Annotated[
         Annotated[BenchAccuracy, tyro.conf.subcommand("accuracy")]
-        | Annotated[BenchFilming, tyro.conf.subcommand("filming")],
+        | Annotated[BenchFilming, tyro.conf.subcommand("filming")]
+        | Annotated[BenchSegmentation, tyro.conf.subcommand("segmentation")],
         tyro.conf.OmitSubcommandPrefixes,
         tyro.conf.OmitArgPrefixes,
     ]
@@ -99,6 +140,15 @@ def accuracy_table(content: dict[str, Any]) -> Table:
             percent(within(found, 0.10)),
         )
     return table
+
+
+def print_grids(content: dict[str, Any]) -> None:
+    """Print every table of the segmentation bench that has rows, and what was left out."""
+    for grid in segmentation_tables.all_grids(content):
+        console.print(f"\n{grid.title}", style="bold", markup=False)
+        console.print(grid.text(), soft_wrap=True, highlight=False, markup=False)
+    for key, problem in content["left_out"].items():
+        console.print(f"left out {key}: {problem}")
 
 
 def rows_of(content: dict[str, Any]) -> Iterator[tuple[str, str, str, dict[str, Any]]]:

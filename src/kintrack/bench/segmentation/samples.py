@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames of a case with all that is known of them, ready to be judged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+from numpy import ndarray
+
+from kintrack.bench.segmentation.cases import MASK_FOLDER, WITNESS_FILE, Case
+from kintrack.bench.segmentation.witness import OWN, VISIBLE
+from kintrack.sequence.folder import open_folder
+from kintrack.sequence.frame import Frame
+from kintrack.sequence.recording import Recording
+from kintrack.sequence.reference import read_reference_pixels
+from segmentation.errors import InputError
+from segmentation.evaluate import true_labels
+from segmentation.labels import BACKGROUND, IGNORED
+from segmentation.preprocess import HOLE, frame_input, labels_to_network
+
+RGBD, DEPTH = "RGB-D", "depth only"
+"""What a network is shown."""
+ROUNDING_M = 0.0015
+"""Readings that differ less are the same, written twice [m]."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A frame ready to be judged."""
+
+    index: int
+    """Its number in the recording."""
+    image: Float[ndarray, "4 106 128"]
+    """The network's input."""
+    size: tuple[int, int]
+    """Width and height of the frame [px]."""
+    truth: UInt8[ndarray, "106 128"] | None = None
+    """True labels."""
+    mask: UInt8[ndarray, "106 128"] | None = None
+    """1 for the person, 0 for all else, `IGNORED` in the bars."""
+    joints: dict[str, Float[ndarray, " 2"]] = field(default_factory=dict)
+    """Visible joints that a witness saw [px]."""
+
+    @property
+    def read(self) -> Bool[ndarray, "106 128"]:
+        """Where there is a depth reading."""
+        return np.asarray(self.image[3] != HOLE)
+
+    @property
+    def colored(self) -> bool:
+        """Whether the frame has colour."""
+        return bool(self.image[:3].any())
+
+    def shown(self, modality: str) -> Float[ndarray, "4 106 128"]:
+        """The input with or without its colour."""
+        if modality == RGBD:
+            return self.image
+        bare = self.image.copy()
+        bare[:3] = 0.0
+        return bare
+
+
+def samples(case: Case, numbers: Sequence[int] | None = None) -> Iterator[Sample]:
+    """The usable ones of some frames of a recording, or of all, read ahead."""
+    recording = open_folder(case.sequence)
+    joints = _witness(case.sequence / WITNESS_FILE)
+    bare = None if case.bare is None else open_folder(case.bare)
+    numbers = range(len(recording)) if numbers is None else numbers
+    pool = ThreadPoolExecutor(1)
+    try:
+        read = pool.map(lambda n: _sample(case, recording, bare, joints, n), numbers)
+        yield from (sample for sample in read if sample is not None)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _sample(
+    case: Case,
+    recording: Recording,
+    bare: Recording | None,
+    joints: list[dict[str, ndarray]],
+    number: int,
+) -> Sample | None:
+    """A frame with all that is known of it; None if its depth cannot be read or nothing is."""
+    frame = recording.frame(number)
+    if frame.depth_m is None:
+        return None
+    try:
+        truth = _truth(frame, bare.frame(number) if bare is not None else None)
+        image = frame_input(frame)
+        mask = _mask(case.sequence / MASK_FOLDER / f"{number:06d}.png")
+    except InputError as error:
+        raise InputError(f"{case.sequence}: {error}") from None
+    seen = joints[number] if number < len(joints) else {}
+    if truth is None and mask is None and not seen:
+        return None
+    size = (recording.camera.width, recording.camera.height)
+    return Sample(number, image, size, truth, mask, seen)
+
+
+def _truth(frame: Frame, bare: Frame | None) -> UInt8[ndarray, "106 128"] | None:
+    """True labels; `IGNORED` where the bare person has a reading that nobody labelled."""
+    if frame.labels is None:
+        return None
+    if bare is None or bare.depth_m is None or bare.labels is None:
+        return true_labels(frame)
+    assert frame.depth_m is not None
+    own = (bare.depth_m > 0) & (np.abs(frame.depth_m - bare.depth_m) < ROUNDING_M)
+    unknown = own & (bare.labels == BACKGROUND)
+    marked = np.where(unknown, np.uint8(IGNORED), frame.labels)
+    return true_labels(Frame(frame.index, 0.0, frame.camera, frame.depth_m, labels=marked))
+
+
+def _mask(path: Path) -> UInt8[ndarray, "106 128"] | None:
+    if not path.is_file():
+        return None
+    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    if image is None:
+        raise InputError(f"{path} is no image")
+    return labels_to_network((image > 0).astype(np.uint8))
+
+
+def _witness(path: Path) -> list[dict[str, ndarray]]:
+    """Visible joints of every frame; none without the file."""
+    if not path.is_file():
+        return []
+    names, pixels, visibility = read_reference_pixels(path)
+    return [
+        {
+            name: pixels[n, j]
+            for j, name in enumerate(names)
+            if name in OWN and visibility[n, j] > VISIBLE and np.isfinite(pixels[n, j]).all()
+        }
+        for n in range(len(pixels))
+    ]
