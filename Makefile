@@ -43,6 +43,9 @@ results: $(DEV)  ## measure accuracy and speed; writes docs/results.md
 	$(PY) tests/benchmarks/sensor_statistics.py $(if $(DATA),--data "$(DATA)")
 	$(PY) tests/benchmarks/data_engine.py $(if $(DATA),--data "$(DATA)")
 	$(PY) tests/benchmarks/accuracy.py $(if $(DATA),--data "$(DATA)")
+	$(PY) tests/benchmarks/solvers.py $(if $(DATA),--data "$(DATA)")
+	$(PY) tests/benchmarks/part_segmentation.py $(if $(DATA),--data "$(DATA)")
+	$(PY) tests/benchmarks/from_recordings.py --write $(if $(DATA),--data "$(DATA)")
 
 clean:  ## remove what the other targets wrote, but not the environment
 	rm -rf kintrack-demo build dist out .pytest_cache .ruff_cache .mypy_cache

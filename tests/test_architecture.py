@@ -54,9 +54,12 @@ HEAVY = {
     "segmentation/train.py": {"torch"},
     "segmentation/runtime.py": {"torch", "openvino"},
     "segmentation/graph.py": {"openvino"},
+    "kintrack/solver/symbolic_body.py": {"casadi"},
+    "kintrack/solver/nlp.py": {"casadi"},
 }
 """Who may import which of the packages that not everybody has."""
-ALL_HEAVY = {"torch", "anny", "pymeshlab", "trimesh", "embreex", "skimage", "PIL", "openvino"}
+ALL_HEAVY = {"torch", "anny", "pymeshlab", "trimesh", "embreex", "skimage", "PIL", "openvino",
+             "casadi"}  # fmt: skip
 ONLY_TO_TEST = {"pytest", "mujoco", "yourdfpy"}
 
 FILES = sorted(SOURCE.rglob("*.py"))

@@ -26,7 +26,8 @@ ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "docs" / "results.md"
 """Where measured results are told."""
 
-PACKAGES = ("kintrack", "numpy", "scipy", "numba", "pin", "opencv-python-headless")
+PACKAGES = ("kintrack", "numpy", "scipy", "numba", "pin", "opencv-python-headless",
+            "casadi", "openvino", "torch")  # fmt: skip
 """Packages whose versions matter to a measurement."""
 
 _TITLE = "# Results\n\nEach section is written by the command that measures it.\n"

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -34,6 +34,8 @@ class Fit:
     """Also write a page with the moving body and the points here."""
     view: bool = False
     """Watch live in a browser."""
+    solver: Literal["gauss-newton", "ipopt"] | None = None
+    """Short for --config.solver.method; ipopt needs the extra `ipopt`."""
     recording: Annotated[Recording, tyro.conf.OmitArgPrefixes] = field(default_factory=Recording)
     """How to read the recording."""
     config: TrackerConfig = field(default_factory=TrackerConfig)
@@ -43,13 +45,16 @@ class Fit:
         """Track with progress; Ctrl-C leaves a valid result."""
         sequence = self.recording.open(self.sequence)
         folder = self.output or self.sequence / RESULT_FOLDER
+        config = self.config
+        if self.solver is not None:
+            config = replace(config, solver=replace(config.solver, method=self.solver))
         viewer = live_viewer(None) if self.view else NullViewer()
         with FitProgress(len(sequence)) as progress:
             try:
                 fit_sequence(
                     sequence,
                     folder,
-                    self.config,
+                    config,
                     Outputs(self.video, self.html),
                     viewer,
                     camera_pose(self.recording.camera_pitch_deg),

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Terms of every kind around a pose, as a frame has them."""
+
+import numpy as np
+
+from kintrack.config import PriorConfig, SurfaceConfig
+from kintrack.human import RESTING_DEG, posed, prior_sigma
+from kintrack.residuals.joints import JointResidual
+from kintrack.residuals.prior import diagonal_prior, gaussian_prior
+from kintrack.residuals.surface import silhouette_residual, surface_residual
+from kintrack.skin import skinned_vertices, vertex_normals
+
+
+def surface(human, state, rng, pairs=400, noise_m=0.01):
+    vertices = skinned_vertices(state, human.skin)
+    vertex = rng.choice(len(vertices), pairs)
+    points = vertices[vertex] + rng.normal(0, noise_m, (pairs, 3))
+    normals = vertex_normals(vertices, human.skin.faces)
+    return surface_residual(human.skin, vertex, points, vertices, normals, SurfaceConfig())
+
+
+def silhouette(human, state, rng):
+    vertices = skinned_vertices(state, human.skin)
+    vertex = rng.choice(len(vertices), 60)
+    points = vertices[vertex] + rng.normal(0, 0.1, (60, 3))
+    return silhouette_residual(human.skin, vertex, points, vertices, SurfaceConfig())
+
+
+def pose_prior(human, state, rng):
+    return diagonal_prior(posed(human.body, RESTING_DEG), prior_sigma(human.body, PriorConfig()))
+
+
+def motion_prior(human, state, rng):
+    root = rng.normal(0, 0.1, (human.body.nv, human.body.nv))
+    covariance = root @ root.T + 0.01 * np.eye(human.body.nv)
+    predicted = human.body.integrate(state.q, rng.normal(0, 0.2, human.body.nv))
+    return gaussian_prior(predicted, covariance)
+
+
+def joints(human, state, rng):
+    rows = np.array([0, 4, 8, 12])
+    places = state.joint_positions_world[rows] + rng.normal(0, 0.1, (4, 3))
+    return JointResidual(rows, places, 0.03)
+
+
+KINDS = (surface, silhouette, pose_prior, motion_prior, joints)
