@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt8
 from numpy import ndarray
 
 from kintrack.association.observation import Observation
@@ -21,7 +21,7 @@ from kintrack.human import Human
 from kintrack.residuals.linearization import Residual
 from kintrack.residuals.surface import SurfaceResidual, silhouette_residual, surface_residual
 from kintrack.skin import skinned_vertices, vertex_normals
-from kintrack.solver.gauss_newton import solve
+from kintrack.solver.choice import SOLVERS
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,8 @@ class View:
     """Outward unit normals, camera frame."""
     visible: Bool[ndarray, " v"]
     """Vertices the camera would see if nothing else were there."""
+    labels: UInt8[ndarray, " v"]
+    """Body part of every vertex."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def view_skin(
     visible = visible_vertices(
         vertices, normals, human.skin.faces, obs.camera, a.facing, a.self_occlusion_m
     )
-    return View(vertices, normals, visible)
+    return View(vertices, normals, visible, human.skin.labels)
 
 
 def fit_pose(
@@ -113,6 +115,7 @@ def fit_pose(
             config.association.gate_m,
             gate_m,
             config.association.pixel_pairs,
+            view.labels,
         )
         beside = outside_pairs(
             outline,
@@ -121,6 +124,7 @@ def fit_pose(
             view.visible,
             config.association.silhouette_tolerance_m,
             config.association.silhouette_gate_m,
+            config.occlusion.behind_m,
         )
         clock("associate")
         vertices_world = transform_points(T_world_camera, view.vertices_camera)
@@ -142,7 +146,7 @@ def fit_pose(
         )
         view = None
         before = state.joint_positions_world
-        solution = solve(
+        solution = SOLVERS[config.solver.method](
             human.body, state, [surface.joined(outside), *priors], config.solver.steps, damping
         )
         state, damping = solution.state, solution.damping

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.alignment import fit_pose, view_skin
-from kintrack.association.observation import Observation, within
+from kintrack.association.observation import Observation, box_around, within
 from kintrack.body import run_kinematics
 from kintrack.config import TrackerConfig
 from kintrack.errors import ConfigError
@@ -71,9 +71,8 @@ def begin(
     q = solve(body, state, [pull, prior], STEPS, config.solver.damping).state.q
     T_camera_world = invert_rigid(T_world_camera)
     view = view_skin(human, run_kinematics(body, q), T_camera_world, observation, config)
-    margin = config.association.region_margin_m
-    low, high = view.vertices_camera.min(axis=0), view.vertices_camera.max(axis=0)
-    seen = within(observation, np.stack([low - margin, high + margin]))
+    box = box_around(view.vertices_camera, config.association.region_margin_m)
+    seen = within(observation, box)
     prior = diagonal_prior(q, prior_sigma(body, config.prior))
     gates = [config.association.last_gate_m] * config.solver.rounds
     fit = fit_pose(human, seen, q, [prior], T_world_camera, config, gates)

@@ -8,6 +8,7 @@ import sys
 import tyro
 
 from kintrack.commands.bench import Bench
+from kintrack.commands.calibrate import Calibrate
 from kintrack.commands.console import errors
 from kintrack.commands.dataset import Dataset
 from kintrack.commands.demo import Demo
@@ -25,7 +26,17 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point: exit code 0, 2 for a caller's mistake, 130 for Ctrl-C."""
     try:
         tyro.cli(
-            Fit | View | Evaluate | Demo | Label | Occlude | Dataset | Train | Bench | Model,
+            Fit
+            | View
+            | Evaluate
+            | Calibrate
+            | Demo
+            | Label
+            | Occlude
+            | Dataset
+            | Train
+            | Bench
+            | Model,
             prog="kintrack",
             args=arguments,
         ).run()

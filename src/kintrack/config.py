@@ -55,6 +55,8 @@ class AssociationConfig:
     pixel is free space; with more, an empty pixel is the sensor's failure and says nothing."""
     region_margin_m: float = 0.35
     """Observed points further than this from the predicted body's box are ignored [m]."""
+    side_m: float = 0.08
+    """A limb's pixel goes to the other side's limb if that is nearer by about this [m]."""
 
     def __post_init__(self) -> None:
         check_bounds(
@@ -71,6 +73,7 @@ class AssociationConfig:
             pixel_pairs=(0, 20_000),
             background_share=(0.0, 1.0),
             region_margin_m=(0.05, 5.0),
+            side_m=(0.0, 10.0),
         )
 
 
@@ -101,6 +104,47 @@ class SurfaceConfig:
 
 
 @dataclass(frozen=True)
+class OcclusionConfig:
+    """What counts as hidden by something else; only where the image is labelled."""
+
+    nearer_m: float = 0.04
+    """A reading so much nearer than the skin hides it [m]."""
+    behind_m: float = 0.05
+    """A reading so much further away than the skin says that the skin is not there [m]."""
+    open_share: float = 0.08
+    """A hinge is hidden if less than this share of the skin that it moves is open to the camera."""
+
+    def __post_init__(self) -> None:
+        check_bounds(self, nearer_m=(0.0, 1.0), behind_m=(0.0, 1.0), open_share=(0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class ConfidenceConfig:
+    """What the solver's own covariance does not know; calibrated on training recordings."""
+
+    shared_m: float = 0.035
+    """Standard deviation of the error that all pairs of a link share: clothes, template [m]."""
+    floor_m: float = 0.025
+    """Standard deviation of a joint centre within a body that fits perfectly [m]."""
+
+    def __post_init__(self) -> None:
+        check_bounds(self, shared_m=(0.0, 1.0), floor_m=(0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class PullConfig:
+    """How rough places of the parts pull while tracking."""
+
+    sigma_m: float = 0.1
+    """Standard deviation of a joint about its part's place, beyond the free distance [m]."""
+    free_m: float = 0.25
+    """A joint this near to its part's place is not pulled [m]."""
+
+    def __post_init__(self) -> None:
+        check_bounds(self, sigma_m=(1e-3, 1e6), free_m=(0.0, 10.0))
+
+
+@dataclass(frozen=True)
 class PriorConfig:
     """What is known before a frame is seen."""
 
@@ -111,7 +155,7 @@ class PriorConfig:
     twist_rad: float = 0.5
     """Standard deviation of forearm, wrist and ankle hinges about zero [rad]."""
     unseen_s: float = 2.0
-    """Time in which a limb that nobody sees relaxes towards rest [s]."""
+    """Time in which a limb that is not found, though nothing hides it, relaxes towards rest [s]."""
 
     def __post_init__(self) -> None:
         check_bounds(
@@ -137,6 +181,10 @@ class MotionConfig:
     """Standard deviation of unpredicted hinge speed in trunk, neck and clavicles [rad/s]."""
     damping: float = 0.7
     """Share of the last velocity that is carried on."""
+    hidden_s: float = 1.0
+    """Time in which a hidden limb may have gone anywhere [s]."""
+    habit_s: float = 1.0
+    """Time over which the posture is averaged to which a hidden limb returns [s]."""
 
     def __post_init__(self) -> None:
         check_bounds(
@@ -146,13 +194,21 @@ class MotionConfig:
             limb_rad_s=(1e-3, 200),
             trunk_rad_s=(1e-3, 200),
             damping=(0, 1),
+            hidden_s=(1e-3, 1e4),
+            habit_s=(1e-3, 1e4),
         )
+
+
+SOLVER_METHODS = ("gauss-newton", "ipopt")
+"""What can solve for a pose."""
 
 
 @dataclass(frozen=True)
 class SolverConfig:
-    """Damped Gauss-Newton."""
+    """How a pose is found once pixels and skin are paired."""
 
+    method: str = "gauss-newton"
+    """gauss-newton, damped and fast, or ipopt, an interior point with hard joint limits."""
     rounds: int = 5
     """Associations per frame at most."""
     steps: int = 1
@@ -164,6 +220,10 @@ class SolverConfig:
 
     def __post_init__(self) -> None:
         check_bounds(self, rounds=(1, 100), steps=(1, 100), damping=(0, 1e6), tolerance_m=(0, 1))
+        if self.method not in SOLVER_METHODS:
+            raise ConfigError(
+                f"SolverConfig.method = {self.method!r}: {', '.join(SOLVER_METHODS)} are possible"
+            )
 
 
 @dataclass(frozen=True)
@@ -240,6 +300,12 @@ class TrackerConfig:
     """Pairs of points and vertices."""
     surface: SurfaceConfig = field(default_factory=SurfaceConfig)
     """Data term."""
+    occlusion: OcclusionConfig = field(default_factory=OcclusionConfig)
+    """Hidden limbs."""
+    confidence: ConfidenceConfig = field(default_factory=ConfidenceConfig)
+    """Covariances."""
+    pull: PullConfig = field(default_factory=PullConfig)
+    """Places of the parts."""
     prior: PriorConfig = field(default_factory=PriorConfig)
     """Pose prior."""
     motion: MotionConfig = field(default_factory=MotionConfig)

@@ -36,3 +36,7 @@ class SceneError(KintrackError):
 
 class DatasetError(KintrackError):
     """A dataset cannot be built, or what is there does not fit the recipe."""
+
+
+class SegmenterError(KintrackError):
+    """A segmenter returned something that is no label map of the frame."""

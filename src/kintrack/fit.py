@@ -14,6 +14,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.body import run_kinematics
+from kintrack.calibration.person import Person, dressed_human, human_of
 from kintrack.config import TrackerConfig
 from kintrack.errors import ResultError
 from kintrack.export import HtmlRecorder, VideoWriter, draw_overlay
@@ -21,7 +22,9 @@ from kintrack.export.overlay import depth_range
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
 from kintrack.human import Human, load_human
 from kintrack.joints import JOINT_NAMES
+from kintrack.person import LabelledConfig
 from kintrack.result import FrameResult, Track, TrackWriter, make_result_folder
+from kintrack.segmenter import Segmenter
 from kintrack.sequence.frame import Frame, SequenceReader
 from kintrack.skin import skinned_vertices
 from kintrack.tracker import Tracker
@@ -50,6 +53,9 @@ def fit_sequence(
     T_world_camera: Float[ndarray, "4 4"] = T_LEVEL_WORLD_CAMERA,
     on_frame: Callable[[Frame, FrameResult], None] = lambda frame, result: None,
     begun: tuple[Frame, Float[ndarray, "j 3"]] | None = None,
+    segmenter: Segmenter | None = None,
+    person: Person | None = None,
+    labelled: LabelledConfig | None = None,
 ) -> Track:
     """Track a recording into a result folder that is valid at every moment.
 
@@ -63,6 +69,10 @@ def fit_sequence(
         on_frame: Called after every frame, for progress.
         begun: A frame, and the joints in it as far as they are known (`Tracker.begin`), with which
             the tracker starts before the first frame; it starts by itself if None.
+        segmenter: Labels every frame; None for the geometry alone.
+        person: Who it is; if None, or if the template stands in for him, the average adult, sized
+            at the start.
+        labelled: What belongs to labels; the defaults if None.
 
     Returns:
         The track; also written when an exception or Ctrl-C ends the loop.
@@ -75,10 +85,14 @@ def fit_sequence(
     for path in (outputs.video, outputs.html):
         if path is not None:
             make_result_folder(path.parent)
-    tracker = Tracker(config, T_world_camera=T_world_camera)
+    human = None if person is None or person.is_template else human_of(person)
+    worn = {} if human is None or person is None else person.clothing_m
+    tracker = Tracker(config, human, T_world_camera, segmenter=segmenter, labelled=labelled)
     if begun is not None:
         tracker.begin(*begun)
     facts = asdict(tracker.config)
+    if segmenter is not None:
+        facts |= {"labelled": asdict(tracker.labelled), "segmenter": segmenter.name}
     with ExitStack() as stack:
         writer = stack.enter_context(
             TrackWriter(
@@ -99,7 +113,7 @@ def fit_sequence(
         for frame in sequence:
             result = tracker.step(frame)
             writer.append(result)
-            writer.note(person={"shape": tracker.human.shape})
+            writer.note(person={"shape": tracker.human.shape, "clothing_m": worn})
             vertices = posed_skin(tracker.human, result.q, T_world_camera)
             joints = result.joint_positions_camera_m
             text = caption(result)
@@ -160,10 +174,13 @@ def load_person(folder: Path) -> tuple[Human, Float[ndarray, "4 4"]]:
     path = folder / "summary.json"
     try:
         summary = json.loads(path.read_text())
-        shape = np.array(summary.get("person", {}).get("shape", []), dtype=float)
+        who = summary.get("person", {})
+        shape, worn = np.array(who.get("shape", []), dtype=float), who.get("clothing_m", {})
         T_world_camera = np.array(summary["T_world_camera"], dtype=float).reshape(4, 4)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ResultError(f"{path}: no readable summary of a result ({error!r})") from error
+    if worn:
+        return dressed_human(shape, worn), T_world_camera
     return load_human(shape=shape if len(shape) else None), T_world_camera
 
 

@@ -11,10 +11,13 @@ from numpy import ndarray
 from scipy.spatial import cKDTree
 
 from kintrack.alignment import View
+from kintrack.association.hiding import hidden_vertices
 from kintrack.association.observation import Observation
 from kintrack.association.window import associate, sample_region
-from kintrack.config import JudgeConfig
+from kintrack.config import JudgeConfig, OcclusionConfig
 
+NEARER_M = OcclusionConfig().nearer_m
+"""What is this much nearer than the skin hides it [m]."""
 SAMPLES = 600
 """About how many observed points are asked whether the skin explains them."""
 
@@ -26,7 +29,8 @@ class Agreement:
     explained: float
     """Share of the observed region that lies near the visible skin, 0 to 1."""
     supported: float
-    """Share of the visible skin that has an observed point near it, 0 to 1."""
+    """Share of the visible skin that has an observed point near it, 0 to 1; skin behind something
+    else is not asked."""
     vertex_supported: Bool[ndarray, " v"]
     """Visible vertices with an observed point near them."""
 
@@ -43,14 +47,21 @@ def agreement(view: View, observation: Observation, explained_m: float) -> Agree
         Shares, 0 where there is nothing to compare.
     """
     pairs = associate(
-        observation, view.vertices_camera, view.visible, explained_m, explained_m, SAMPLES
+        observation,
+        view.vertices_camera,
+        view.visible,
+        explained_m,
+        explained_m,
+        SAMPLES,
+        view.labels,
     )
     supported = np.zeros(len(view.visible), dtype=bool)
     supported[pairs.vertex[: pairs.from_skin]] = True
-    asked = len(sample_region(observation, SAMPLES))
+    hidden = hidden_vertices(observation, view.vertices_camera, view.visible, view.labels, NEARER_M)
+    asked = len(sample_region(observation, SAMPLES)[0])
     return Agreement(
         explained=(len(pairs.vertex) - pairs.from_skin) / max(asked, 1),
-        supported=pairs.from_skin / max(int(view.visible.sum()), 1),
+        supported=pairs.from_skin / max(int((view.visible & (supported | ~hidden)).sum()), 1),
         vertex_supported=supported,
     )
 
@@ -66,7 +77,7 @@ def distance_between(view: View, observation: Observation, most_m: float) -> flo
     Returns:
         Mean of the two directions' means; the cap where there is nothing to compare.
     """
-    points = sample_region(observation, 1500)
+    points, _ = sample_region(observation, 1500)
     skin = view.vertices_camera[view.visible]
     if len(points) == 0 or len(skin) == 0:
         return most_m
@@ -89,8 +100,17 @@ def joint_visibility(
     supported: Bool[ndarray, " v"],
     joint_positions_camera: Float[ndarray, "j 3"],
     radius_m: float = 0.13,
+    shell_m: float = 0.05,
 ) -> Float[ndarray, " j"]:
-    """Share of the camera-facing skin around each joint that was observed, shape (J,)."""
+    """Share of the camera-facing skin around each joint that was observed, shape (J,).
+
+    Args:
+        view: The skin seen by the camera.
+        supported: Vertices with an observed point near them.
+        joint_positions_camera: Joint centres [m].
+        radius_m: Skin this near is around a joint [m].
+        shell_m: Around a joint that lies deeper, what is this much further than the nearest [m].
+    """
     rays = view.vertices_camera / np.linalg.norm(view.vertices_camera, axis=1, keepdims=True)
     facing = np.einsum("ij,ij->i", view.normals_camera, rays) < -0.15
     d2 = (
@@ -98,5 +118,6 @@ def joint_visibility(
         - 2 * joint_positions_camera @ view.vertices_camera.T
         + (joint_positions_camera**2).sum(axis=1)[:, None]
     )
-    near = (d2 < radius_m**2) & facing
+    nearest = np.sqrt(np.maximum(np.where(facing, d2, np.inf).min(axis=1), 0.0))
+    near = (d2 < np.maximum(radius_m, nearest + shell_m)[:, None] ** 2) & facing
     return (near & supported).sum(axis=1) / np.maximum(near.sum(axis=1), 1)

@@ -20,8 +20,6 @@ from segmentation.training_config import TrainConfig
 if TYPE_CHECKING:
     from segmentation.weights import Weights
 
-SHIPPED = Path(__file__).parent / "pretrained" / "fast_fcn.safetensors"
-"""Weights to begin with if none are given."""
 GAP = 15
 """Pictures between the two parts of a single recording that belong to neither."""
 LEAST = 10

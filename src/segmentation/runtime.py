@@ -53,8 +53,10 @@ class RuntimeConfig:
 class Segmenter(Protocol):
     """Labels a frame at the network's size; `labels_to_image` brings them to the frame's."""
 
-    runtime: str
-    """What computes the labels."""
+    @property
+    def runtime(self) -> str:
+        """What computes the labels."""
+        ...
 
     def segment(self, frame: Frame) -> UInt8[ndarray, "106 128"]:
         """The most probable label of every pixel of the network's picture."""

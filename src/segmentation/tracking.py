@@ -23,6 +23,11 @@ class ImageSegmenter:
     network: Segmenter
     """Labels the network's picture."""
 
+    @property
+    def name(self) -> str:
+        """How the labels are computed."""
+        return f"network, {self.network.runtime}"
+
     def segment(self, frame: Frame) -> UInt8[ndarray, "r c"]:
         """The labels of the cells that lie in the image.
 
@@ -38,6 +43,9 @@ class TrueSegmenter:
 
     A frame without labels shows nobody.
     """
+
+    name = "labels of the recording"
+    """As it stands in a result's summary."""
 
     def segment(self, frame: Frame) -> UInt8[ndarray, "r c"]:
         """True labels of the cells that lie in the image."""

@@ -54,3 +54,12 @@ def test_points_outside_a_box_leave_the_region_but_not_the_image(frame):
 def test_pixels_without_a_reading_stay_out_even_if_the_box_holds_the_camera(frame):
     part = within(observe(frame, 320), np.array([[-9.0] * 3, [9.0] * 3]))
     assert np.array_equal(part.region, observe(frame, 320).region)
+
+
+def test_with_labels_the_region_is_the_labelled_pixels_that_have_a_reading(frame):
+    labels = np.zeros((481, 640), dtype=np.uint8)
+    labels[100:300, 200:400] = 2
+    seen = observe(frame, 640, labels=labels)
+    assert np.array_equal(seen.region, observe(frame, 640).region & (labels == 2))
+    assert np.array_equal(seen.labels == 2, seen.region)
+    assert seen.has_background == observe(frame, 640).has_background

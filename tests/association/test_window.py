@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 import multiprocessing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from kintrack.skin import skinned_vertices
 CAMERA = PinholeCamera(64, 48, 60.0, 61.0, 31.5, 23.5)
 GATE_M = 0.12
 """At 1.2 m this is a window of 6 px each side, below `MAX_HALF_WINDOW`: nothing is skipped."""
+ANY = np.ones(400, dtype=np.uint8)
+"""Labels of the vertices; they count only where the observation is labelled."""
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +53,7 @@ def nearest_in_window(observation, vertex, gate_m):
 
 def test_every_vertex_takes_the_nearest_point_in_its_window(cloud, vertices):
     seen = np.ones(len(vertices), dtype=bool)
-    pairs = associate(cloud, vertices, seen, GATE_M, GATE_M, pixel_pairs=0)
+    pairs = associate(cloud, vertices, seen, GATE_M, GATE_M, pixel_pairs=0, vertex_labels=ANY)
     found = dict(zip(pairs.vertex, pairs.points_camera, strict=True))
     assert pairs.from_skin == len(found) > 50
     for i, vertex in enumerate(vertices):
@@ -62,9 +65,9 @@ def test_every_vertex_takes_the_nearest_point_in_its_window(cloud, vertices):
 
 def test_every_sampled_pixel_takes_the_nearest_visible_vertex(cloud, vertices):
     seen = np.random.default_rng(2).random(len(vertices)) > 0.4
-    pairs = associate(cloud, vertices, seen, GATE_M, 0.08, pixel_pairs=300)
+    pairs = associate(cloud, vertices, seen, GATE_M, 0.08, pixel_pairs=300, vertex_labels=ANY)
     vertex, points = pairs.vertex[pairs.from_skin :], pairs.points_camera[pairs.from_skin :]
-    sampled = sample_region(cloud, 300)
+    sampled = sample_region(cloud, 300)[0]
     distance = np.linalg.norm(sampled[:, None] - vertices[seen][None], axis=-1)
     near = distance.min(axis=1) < 0.08
     assert 20 < near.sum() < len(sampled)
@@ -74,7 +77,7 @@ def test_every_sampled_pixel_takes_the_nearest_visible_vertex(cloud, vertices):
 
 def test_no_pair_is_longer_than_its_gate(cloud, vertices):
     seen = np.ones(len(vertices), dtype=bool)
-    pairs = associate(cloud, vertices, seen, 0.05, 0.2, pixel_pairs=500)
+    pairs = associate(cloud, vertices, seen, 0.05, 0.2, pixel_pairs=500, vertex_labels=ANY)
     length = np.linalg.norm(vertices[pairs.vertex] - pairs.points_camera, axis=1)
     n = pairs.from_skin
     assert length[:n].max() < 0.05
@@ -83,7 +86,7 @@ def test_no_pair_is_longer_than_its_gate(cloud, vertices):
 
 def test_invisible_vertices_and_points_outside_the_region_do_not_pair(cloud, vertices):
     seen = np.arange(len(vertices)) % 2 == 0
-    pairs = associate(cloud, vertices, seen, GATE_M, GATE_M, pixel_pairs=500)
+    pairs = associate(cloud, vertices, seen, GATE_M, GATE_M, pixel_pairs=500, vertex_labels=ANY)
     assert seen[pairs.vertex].all()
     allowed = {tuple(p) for p in cloud.points_camera[cloud.region]}
     assert {tuple(p) for p in pairs.points_camera} <= allowed
@@ -91,7 +94,7 @@ def test_invisible_vertices_and_points_outside_the_region_do_not_pair(cloud, ver
 
 def test_a_wide_gate_skips_pixels_evenly_and_still_finds_a_near_point(cloud, vertices):
     seen = np.ones(len(vertices), dtype=bool)
-    pairs = associate(cloud, vertices, seen, 0.5, 0.5, pixel_pairs=0)
+    pairs = associate(cloud, vertices, seen, 0.5, 0.5, pixel_pairs=0, vertex_labels=ANY)
     length = np.linalg.norm(vertices[pairs.vertex] - pairs.points_camera, axis=1)
     exact = np.linalg.norm(
         vertices[pairs.vertex][:, None] - cloud.points_camera[cloud.region][None], axis=-1
@@ -105,7 +108,7 @@ def test_without_observation_or_skin_there_are_no_pairs(cloud, vertices, pixel_p
     empty = Observation(CAMERA, cloud.points_camera, np.zeros((48, 64), dtype=bool))
     seen = np.ones(len(vertices), dtype=bool)
     for observation, visible in ((empty, seen), (cloud, ~seen)):
-        pairs = associate(observation, vertices, visible, GATE_M, GATE_M, pixel_pairs)
+        pairs = associate(observation, vertices, visible, GATE_M, GATE_M, pixel_pairs, ANY)
         assert len(pairs.vertex) == len(pairs.points_camera) == pairs.from_skin == 0
         assert pairs.points_camera.shape == (0, 3)
 
@@ -113,7 +116,7 @@ def test_without_observation_or_skin_there_are_no_pairs(cloud, vertices, pixel_p
 def test_the_sample_is_about_as_large_as_asked_and_lies_on_the_region(cloud):
     allowed = {tuple(p) for p in cloud.points_camera[cloud.region]}
     for count in (50, 200, 1000, 10_000):
-        points = sample_region(cloud, count)
+        points = sample_region(cloud, count)[0]
         assert {tuple(p) for p in points} <= allowed
         assert 0.6 * min(count, cloud.region.sum()) <= len(points) <= max(2.5 * count, 10)
 
@@ -126,7 +129,9 @@ def test_association_repeats_to_the_bit(human, scene):
         invert_rigid(T_LEVEL_WORLD_CAMERA), skinned_vertices(state, human.skin)
     ) + np.array([0.02, -0.01, 0.03])
     seen = np.ones(len(vertices), dtype=bool)
-    first, *others = (associate(observation, vertices, seen, 0.05, 0.1, 1200) for _ in range(4))
+    first, *others = (
+        associate(observation, vertices, seen, 0.05, 0.1, 1200, human.skin.labels) for _ in range(4)
+    )
     assert len(first.vertex) > 1500
     for again in others:
         assert first.vertex.tobytes() == again.vertex.tobytes()
@@ -135,8 +140,46 @@ def test_association_repeats_to_the_bit(human, scene):
 
 def test_a_forked_process_searches_too(cloud, vertices):
     visible = np.ones(len(vertices), dtype=bool)
-    here = associate(cloud, vertices, visible, 0.05, 0.1, 100)
+    here = associate(cloud, vertices, visible, 0.05, 0.1, 100, ANY)
     with multiprocessing.get_context("fork").Pool(1) as pool:
-        there = pool.apply_async(associate, (cloud, vertices, visible, 0.05, 0.1, 100)).get(30)
+        there = pool.apply_async(associate, (cloud, vertices, visible, 0.05, 0.1, 100, ANY)).get(30)
     assert np.array_equal(here.vertex, there.vertex)
     assert np.array_equal(here.points_camera, there.points_camera)
+
+
+@pytest.fixture(scope="module")
+def labelled(cloud):
+    labels = np.random.default_rng(5).integers(0, 4, (48, 64)).astype(np.uint8)
+    return replace(cloud, labels=labels, region=cloud.region & (labels > 0))
+
+
+def test_only_equal_labels_pair_in_both_directions(labelled, vertices):
+    part = np.random.default_rng(6).integers(1, 4, len(vertices)).astype(np.uint8)
+    seen = np.ones(len(vertices), dtype=bool)
+    pairs = associate(labelled, vertices, seen, GATE_M, GATE_M, 500, part)
+    label_of = {
+        tuple(p): label
+        for p, label in zip(
+            labelled.points_camera.reshape(-1, 3), labelled.labels.ravel(), strict=True
+        )
+    }
+    found = np.array([label_of[tuple(p)] for p in pairs.points_camera])
+    assert 50 < pairs.from_skin < len(found) - 50
+    assert np.array_equal(found, part[pairs.vertex])
+
+
+def test_a_gated_pixel_takes_the_nearest_vertex_of_its_own_part(labelled, vertices):
+    part = np.random.default_rng(6).integers(1, 4, len(vertices)).astype(np.uint8)
+    seen = np.ones(len(vertices), dtype=bool)
+    pairs = associate(labelled, vertices, seen, GATE_M, 0.15, 500, part)
+    points, labels = sample_region(labelled, 500)
+    distance = np.linalg.norm(points[:, None] - vertices[None], axis=-1)
+    distance[labels[:, None] != part[None]] = np.inf
+    near = distance.min(axis=1) < 0.15
+    assert np.array_equal(pairs.vertex[pairs.from_skin :], distance.argmin(axis=1)[near])
+
+
+def test_a_part_that_nobody_labelled_does_not_pair(labelled, vertices):
+    seen = np.ones(len(vertices), dtype=bool)
+    pairs = associate(labelled, vertices, seen, GATE_M, GATE_M, 500, 6 * ANY)
+    assert len(pairs.vertex) == 0

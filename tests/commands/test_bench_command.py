@@ -3,9 +3,11 @@ import json
 
 import pytest
 
-from kintrack.bench import accuracy
+from kintrack.bench import recordings
 from kintrack.cli import main
 from synthesis.dataset.recipes import takes_of
+
+GEOMETRY = ["--methods", "geometry"]
 
 
 @pytest.fixture(scope="module")
@@ -14,9 +16,9 @@ def benched(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bench") / "out"
     with pytest.MonkeyPatch.context() as patch:
         one = [take for take in takes_of("bench", 0, None, 2) if take.part == "alone"][:1]
-        patch.setattr(accuracy, "takes_of", lambda *given: one)
+        patch.setattr(recordings, "takes_of", lambda *given: one)
         arguments = ["bench", "accuracy", "--output", str(folder), "--groups", "alone"]
-        main([*arguments, "--frames", "2", "--workers", "1"])
+        main([*arguments, *GEOMETRY, "--frames", "2", "--workers", "1"])
     return folder
 
 
@@ -47,8 +49,19 @@ def test_unknown_methods_and_groups_list_what_there_is(tmp_path, capsys):
 
 def test_a_folder_without_recordings_is_refused(tmp_path, capsys):
     (tmp_path / "empty").mkdir()
-    options = ["--groups", "real", "--real", str(tmp_path / "empty")]
+    for group in ("real", "scenes"):
+        options = ["--groups", group, "--data", str(tmp_path / "empty"), *GEOMETRY]
+        with pytest.raises(SystemExit) as ended:
+            main(["bench", "accuracy", "--output", str(tmp_path / "out"), *options])
+        assert ended.value.code == 2
+        assert "no recordings there" in " ".join(capsys.readouterr().err.split())
+
+
+def test_weights_that_are_none_are_named_before_any_work(tmp_path, capsys):
+    (tmp_path / "bad.safetensors").write_bytes(b"no weights")
+    options = ["--weights", f"mine={tmp_path / 'bad.safetensors'}", "--output"]
     with pytest.raises(SystemExit) as ended:
-        main(["bench", "accuracy", "--output", str(tmp_path / "out"), *options])
+        main(["bench", "accuracy", *options, str(tmp_path / "out")])
     assert ended.value.code == 2
-    assert "no recordings there" in " ".join(capsys.readouterr().err.split())
+    assert "bad.safetensors" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -12,6 +12,7 @@ from kintrack.residuals.joints import JointResidual
 from kintrack.residuals.linearization import quadratic_of
 from kintrack.residuals.prior import diagonal_prior, gaussian_prior
 from kintrack.residuals.surface import silhouette_residual, surface_residual
+from kintrack.residuals.targets import TargetResidual
 from kintrack.skin import skinned_vertices, vertex_normals
 
 
@@ -48,7 +49,14 @@ def joints(human, state, rng):
     return JointResidual(rows, places, 0.03)
 
 
-TERMS = [surface, silhouette, pose_prior, motion_prior, joints]
+def targets(human, state, rng):
+    rows = np.array([3, 6, 11, 14])
+    away = rng.normal(size=(4, 3))
+    away *= np.array([0.05, 0.4, 0.3, 0.6])[:, None] / np.linalg.norm(away, axis=1, keepdims=True)
+    return TargetResidual(rows, state.joint_positions_world[rows] + away, 0.1, 0.2)
+
+
+TERMS = [surface, silhouette, pose_prior, motion_prior, joints, targets]
 
 
 @pytest.fixture(params=TERMS, ids=lambda make: make.__name__)
@@ -110,3 +118,12 @@ def test_a_full_covariance_measures_mahalanobis_distance(body):
     state = run_kinematics(body, body.integrate(q, v))
     expected = 0.5 * v @ np.linalg.solve(covariance, v)
     assert gaussian_prior(q, covariance).cost(state) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_target_within_its_free_distance_does_nothing_and_no_targets_neither(body, legal_pose):
+    state = run_kinematics(body, legal_pose(0))
+    places = state.joint_positions_world[[3, 6]] + [[0.1, 0, 0], [0, 0.3, 0]]
+    near, far = TargetResidual(np.array([3, 6]), places, 0.1, 0.2).linearize(state).r.reshape(2, 3)
+    assert not near.any() and np.allclose(far, [0, -0.1, 0])
+    none = TargetResidual(np.zeros(0, int), np.zeros((0, 3)), 0.1, 0.2)
+    assert none.cost(state) == 0 and not none.quadratic(state).H.any()

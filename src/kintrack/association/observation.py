@@ -6,10 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt8
 from numba import njit
 from numpy import ndarray
 
+from kintrack.association.labelling import labels_of_pixels
 from kintrack.geometry import PinholeCamera
 from kintrack.sequence.frame import Frame
 
@@ -26,31 +27,50 @@ class Observation:
     """Pixels that may belong to the person."""
     has_background: bool = False
     """True if an empty pixel is the sensor's failure, not free space."""
+    labels: UInt8[ndarray, "h w"] | None = None
+    """Body part of every pixel, 0 = not the person or no reading; None without a segmenter."""
 
 
-def observe(frame: Frame, max_width_px: int, background_share: float = 0.5) -> Observation:
+def observe(
+    frame: Frame,
+    max_width_px: int,
+    background_share: float = 0.5,
+    labels: UInt8[ndarray, "r c"] | None = None,
+) -> Observation:
     """Back-project a frame, thinned to at most `max_width_px` columns.
 
     Args:
         frame: A good frame.
         max_width_px: Largest working width [px].
         background_share: Share of pixels with a reading from which a background is assumed.
+        labels: Label map that covers the whole image, in any size; None if there is none.
 
     Returns:
-        The observation; its region is every pixel with a reading.
+        The observation; its region is every pixel with a reading, or, where there are labels,
+        every one that a label calls a part of the person.
     """
     assert frame.depth_m is not None
     factor = -(-frame.camera.width // max_width_px)
     camera = frame.camera.scaled(factor)
     points = camera.back_project(frame.depth_m[::factor, ::factor])
     read = points[..., 2] > 0
-    return Observation(camera, points, read, bool(read.mean() >= background_share))
+    has_background = bool(read.mean() >= background_share)
+    if labels is None:
+        return Observation(camera, points, read, has_background)
+    part = labels_of_pixels(labels, points[..., 2])
+    return Observation(camera, points, part > 0, has_background, part)
 
 
 def within(observation: Observation, box_camera: Float[ndarray, "2 3"]) -> Observation:
     """The observation restricted to points inside an axis-aligned box of the camera frame."""
     inside = _inside(observation.points_camera, observation.region, box_camera)
     return replace(observation, region=inside)
+
+
+def box_around(vertices_camera: Float[ndarray, "v 3"], margin_m: float) -> Float[ndarray, "2 3"]:
+    """Axis-aligned box around some vertices, grown by a margin; lower and upper corner [m]."""
+    low, high = vertices_camera.min(axis=0), vertices_camera.max(axis=0)
+    return np.stack([low - margin_m, high + margin_m])
 
 
 @njit(cache=True)

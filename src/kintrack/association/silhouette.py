@@ -59,6 +59,7 @@ def outside_pairs(
     visible: Bool[ndarray, " v"],
     tolerance_m: float,
     gate_m: float,
+    behind_m: float = 0.05,
 ) -> SilhouettePairs:
     """Visible vertices whose pixel lies outside the region by more than a tolerance.
 
@@ -69,6 +70,8 @@ def outside_pairs(
         visible: Vertices that the camera would see, inside the image.
         tolerance_m: Distance outside that is forgiven, the raggedness of the silhouette [m].
         gate_m: Distance beyond which a vertex is left alone [m].
+        behind_m: In a labelled image, what is seen must be so far behind the skin [m]: a nearer
+            pixel may be the person's with a wrong label.
 
     Returns:
         The pairs.
@@ -80,7 +83,8 @@ def outside_pairs(
     v = np.clip(np.floor(camera.fy * y / z + camera.cy + 0.5), 0, camera.height - 1).astype(int)
     away_m = shape.distance_px[v, u] * z / camera.fx
     seen_m = observation.points_camera[v, u, 2]
-    free = np.where(seen_m > 0, seen_m > z, not observation.has_background)
+    past_m = z if observation.labels is None else z + behind_m
+    free = np.where(seen_m > 0, seen_m > past_m, not observation.has_background)
     out = free & (away_m > tolerance_m) & (away_m < gate_m)
     row, column = np.divmod(shape.nearest[v[out], u[out]], camera.width)
     z = z[out]

@@ -4,6 +4,7 @@
 Skin to pixels: every visible vertex projects into the depth image and takes the nearest observed
 3-D point in a window around that pixel. Pixels to skin: a regular subset of the observed pixels
 takes the nearest visible vertex, so that an arm which the model does not cover pulls it back.
+Where the image is labelled, only equal labels pair, in both directions [Wan19].
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt8
 from numba import njit
 from numpy import ndarray
 from scipy.spatial import cKDTree
@@ -33,6 +34,8 @@ class Pairs(NamedTuple):
     """How many of the pairs were found from the skin; they come first."""
 
 
+APART_M = 10.0
+"""Parts lie this far from each other along the fourth axis of the tree [m]; above any gate."""
 MAX_HALF_WINDOW = 8
 """Pixels looked at on each side of the projection; wider windows skip pixels evenly."""
 
@@ -44,6 +47,7 @@ def associate(
     gate_m: float,
     pixel_gate_m: float,
     pixel_pairs: int,
+    vertex_labels: UInt8[ndarray, " v"],
 ) -> Pairs:
     """Pair skin and observation in both directions.
 
@@ -54,6 +58,7 @@ def associate(
         gate_m: Largest distance of a pair found from the skin [m].
         pixel_gate_m: Largest distance of a pair found from a pixel [m].
         pixel_pairs: About how many pixels look for a vertex; 0 for the paper's one direction.
+        vertex_labels: Body part of every vertex; counts only where the observation is labelled.
 
     Returns:
         The pairs, in a fixed order.
@@ -64,17 +69,23 @@ def associate(
         _search,
         vertices_camera[index],
         observation.points_camera,
-        observation.region,
+        _wanted(observation),
+        vertex_labels[index] if observation.labels is not None else np.ones(len(index), np.uint8),
         camera.fx,
         camera.fy,
         camera.cx,
         camera.cy,
         gate_m,
     )
-    seen = sample_region(observation, pixel_pairs) if pixel_pairs else np.zeros((0, 3))
+    seen, part = sample_region(observation, pixel_pairs)
     if len(seen) and len(index):
-        tree = cKDTree(vertices_camera[index], balanced_tree=False, compact_nodes=False)
-        distance, nearest = map(np.asarray, tree.query(seen, distance_upper_bound=pixel_gate_m))
+        skin = vertices_camera[index]
+        asked = seen
+        if part is not None:
+            skin = np.column_stack([skin, APART_M * vertex_labels[index]])
+            asked = np.column_stack([seen, APART_M * part])
+        tree = cKDTree(skin, balanced_tree=False, compact_nodes=False)
+        distance, nearest = map(np.asarray, tree.query(asked, distance_upper_bound=pixel_gate_m))
         near = np.isfinite(distance)
         seen, taken = seen[near], index[nearest[near]]
     else:
@@ -98,16 +109,33 @@ def _second_core() -> ThreadPoolExecutor:
 os.register_at_fork(after_in_child=_second_core.cache_clear)
 
 
-def sample_region(observation: Observation, count: int) -> Float[ndarray, "n 3"]:
-    """About `count` points of the region on a regular pixel grid, camera frame [m]."""
-    step = max(1, int(np.sqrt(np.count_nonzero(observation.region) / count)))
-    thin = observation.region[::step, ::step]
-    return observation.points_camera[::step, ::step][thin]
+def sample_region(
+    observation: Observation, count: int
+) -> tuple[Float[ndarray, "n 3"], UInt8[ndarray, " n"] | None]:
+    """About `count` points of the region on a regular pixel grid.
+
+    Returns:
+        Points in the camera frame [m], and their labels, none of them 0, if there are any.
+    """
+    if not count:
+        return np.zeros((0, 3)), None
+    wanted = _wanted(observation)
+    step = max(1, int(np.sqrt(np.count_nonzero(wanted) / count)))
+    label = wanted[::step, ::step]
+    thin = label > 0
+    points = observation.points_camera[::step, ::step][thin]
+    return points, None if observation.labels is None else label[thin]
+
+
+def _wanted(observation: Observation) -> UInt8[ndarray, "h w"]:
+    """Label with which a pixel may pair, 0 for none; 1 throughout the region without labels."""
+    region = observation.region.view(np.uint8)
+    return region if observation.labels is None else observation.labels * region
 
 
 @njit(cache=True, nogil=True)
-def _search(v, points, region, fx, fy, cx, cy, gate):
-    h, w = region.shape
+def _search(v, points, wanted, part, fx, fy, cx, cy, gate):
+    h, w = wanted.shape
     out = np.full(v.shape[0], -1, dtype=np.int64)
     for i in range(v.shape[0]):
         x, y, z = v[i, 0], v[i, 1], v[i, 2]
@@ -121,7 +149,7 @@ def _search(v, points, region, fx, fy, cx, cy, gate):
         left = max(0, -((u - half) // step)) * step if u < half else 0
         for a in range(r - half + above, min(h, r + half + 1), step):
             for b in range(u - half + left, min(w, u + half + 1), step):
-                if not region[a, b]:
+                if wanted[a, b] != part[i]:
                     continue
                 dx = points[a, b, 0] - x
                 dy = points[a, b, 1] - y

@@ -10,12 +10,15 @@ from typing import Annotated, Literal
 
 import tyro
 
+from kintrack.calibration.person import read_person
 from kintrack.commands.console import FitProgress, console
 from kintrack.commands.recording import Recording
+from kintrack.commands.segmenting import Segmentation
 from kintrack.commands.view import live_viewer
 from kintrack.config import TrackerConfig
 from kintrack.fit import RESULT_FOLDER, Outputs, fit_sequence
 from kintrack.geometry import camera_pose
+from kintrack.person import LabelledConfig
 from kintrack.result import TRACK_FILE, Track
 from kintrack.viewer import NullViewer
 
@@ -34,12 +37,20 @@ class Fit:
     """Also write a page with the moving body and the points here."""
     view: bool = False
     """Watch live in a browser."""
+    person: Path | None = None
+    """Who it is, from kintrack calibrate; sized from the first frame if not given."""
+    segmentation: Annotated[Segmentation, tyro.conf.OmitArgPrefixes] = field(
+        default_factory=Segmentation
+    )
+    """What labels the pixels."""
     solver: Literal["gauss-newton", "ipopt"] | None = None
     """Short for --config.solver.method; ipopt needs the extra `ipopt`."""
     recording: Annotated[Recording, tyro.conf.OmitArgPrefixes] = field(default_factory=Recording)
     """How to read the recording."""
     config: TrackerConfig = field(default_factory=TrackerConfig)
     """The tracker."""
+    labelled: LabelledConfig = field(default_factory=LabelledConfig)
+    """What belongs to labels: who is a person, when tracking begins and ends."""
 
     def run(self) -> None:
         """Track with progress; Ctrl-C leaves a valid result."""
@@ -48,6 +59,8 @@ class Fit:
         config = self.config
         if self.solver is not None:
             config = replace(config, solver=replace(config.solver, method=self.solver))
+        person = None if self.person is None else read_person(self.person)
+        segmenter = self.segmentation.segmenter()
         viewer = live_viewer(None) if self.view else NullViewer()
         with FitProgress(len(sequence)) as progress:
             try:
@@ -59,6 +72,9 @@ class Fit:
                     viewer,
                     camera_pose(self.recording.camera_pitch_deg),
                     progress,
+                    segmenter=segmenter,
+                    person=person,
+                    labelled=self.labelled,
                 )
             finally:
                 viewer.close()

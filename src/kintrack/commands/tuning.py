@@ -49,7 +49,6 @@ def tune(options: Train, command: str) -> Path:
     from segmentation.dataset import Split
     from segmentation.pack import pack
     from segmentation.recordings import (
-        SHIPPED,
         divide,
         divided,
         mixed,
@@ -58,7 +57,7 @@ def tune(options: Train, command: str) -> Path:
     )
     from segmentation.train import sources_of, train
     from segmentation.tuning_report import verdict_of, write_report
-    from segmentation.weights import load_weights
+    from segmentation.weights import SHIPPED, load_weights
 
     if int(os.environ.get("WORLD_SIZE", 1)) > 1:
         raise ConfigError("--from-recordings runs in one process; start it without torchrun")

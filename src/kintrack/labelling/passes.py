@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 from jaxtyping import Float
 from numpy import ndarray
 
+from kintrack.belief import Belief
 from kintrack.config import TrackerConfig
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.human import Human
 from kintrack.result import FrameResult
 from kintrack.sequence.frame import Frame, SequenceReader
-from kintrack.tracker import Belief, Tracker
+from kintrack.tracker import Tracker
 
 
 @dataclass(frozen=True)

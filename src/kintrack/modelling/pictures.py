@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of the human: extreme but legal poses, and what each shape coefficient does."""
+"""Pictures of the human: legal poses, and what each shape coefficient does and explains."""
 
 from __future__ import annotations
 
@@ -44,6 +44,8 @@ POSES_DEG: dict[str, dict[str, float]] = {
 """Poses by hinge, both sides alike [deg]."""
 VIEWS_DEG = (0, 60)
 """Headings from which a body is drawn, 0 = from the front [deg]."""
+SHAPES_A_ROW = 5
+"""Coefficients side by side; each below itself with the other sign."""
 _CAMERA = PinholeCamera(260, 380, 340.0, 340.0, 130.0, 195.0)
 _DISTANCE_M = 2.4
 
@@ -84,14 +86,17 @@ def draw_model(folder: Path) -> tuple[Path, Path]:
         for view in VIEWS_DEG
         for title, pose in POSES_DEG.items()
     ]
-    coefficients = len(load_rig(model_folder()).explained)
-    count = min(coefficients, 6)
+    explained = load_rig(model_folder()).explained
+    count = len(explained)
     shapes = [
-        draw_body(value * np.eye(count)[k], {}, 0, f"b{k} = {value:+.0f}")
+        draw_body(value * np.eye(count)[k], {}, 0, f"b{k} = {value:+.0f}  ({explained[k]:.2%})")
+        for first in range(0, count, SHAPES_A_ROW)
         for value in (-2.0, 2.0)
-        for k in range(count)
+        for k in range(first, min(first + SHAPES_A_ROW, count))
     ]
     files = folder / "model_poses.png", folder / "model_shapes.png"
-    for path, images, columns in zip(files, (poses, shapes), (len(POSES_DEG), count), strict=True):
+    for path, images, columns in zip(
+        files, (poses, shapes), (len(POSES_DEG), SHAPES_A_ROW), strict=True
+    ):
         cv2.imwrite(str(path), cv2.cvtColor(contact_sheet(images, columns), cv2.COLOR_RGB2BGR))
     return files

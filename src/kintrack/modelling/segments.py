@@ -13,8 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
+from scipy.spatial import cKDTree
 
 from kintrack.modelling.skeleton import Link, links
+from kintrack.modelling.volume import inside_points
 
 BODY_MASS_INDEX = 24.0
 """Mass over squared height of the average adult [kg/m^2] (NCD-RisC, Lancet 387, 2016: 24.2)."""
@@ -61,6 +63,7 @@ def segment_bodies(
     faces: Int[ndarray, "f 3"],
     weights: Float[ndarray, "v l"],
     Ts_root_link: dict[str, ndarray],
+    body_kg: float | None = None,
 ) -> dict[str, SegmentBody]:
     """Mass properties and capsules of all links of a body in bind pose.
 
@@ -69,6 +72,7 @@ def segment_bodies(
         faces: Its triangles.
         weights: Dense skinning weights over `links()`.
         Ts_root_link: Bind pose of every link.
+        body_kg: Mass of the whole body [kg]; by `BODY_MASS_INDEX` if None.
 
     Returns:
         One `SegmentBody` per link name.
@@ -76,8 +80,8 @@ def segment_bodies(
     tree = links()
     owner = weights.argmax(axis=1)
     samples, sample_owner = _volume_samples(vertices, faces, owner)
-    height = np.ptp(vertices[:, 2])
-    masses = _masses(tree, sample_owner, BODY_MASS_INDEX * height**2)
+    whole_kg = BODY_MASS_INDEX * np.ptp(vertices[:, 2]) ** 2 if body_kg is None else body_kg
+    masses = _masses(tree, sample_owner, float(whole_kg))
     out = {}
     for i, link in enumerate(tree):
         T = Ts_root_link[link.name]
@@ -96,13 +100,7 @@ _CELL_M = 0.01
 
 def _volume_samples(vertices, faces, owner) -> tuple[ndarray, ndarray]:
     """Centres of 1 cm cells inside the body and the link of each cell's nearest vertex."""
-    import trimesh
-    from scipy.spatial import cKDTree
-
-    body = trimesh.Trimesh(vertices, faces, process=False)
-    axes = [np.arange(lo, hi, _CELL_M) for lo, hi in body.bounds.T]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    grid = grid[body.contains(grid)]
+    grid = inside_points(vertices, faces, _CELL_M)
     return grid, owner[cKDTree(vertices).query(grid)[1]]
 
 

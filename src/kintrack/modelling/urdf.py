@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -52,11 +53,18 @@ def _capsule(link: ET.Element, name: str, capsule: tuple[ndarray, ndarray, float
 
 
 def _hinge_joint(
-    robot: ET.Element, link: Link, hinge: Hinge, parent: str, child: str, xyz: ndarray
+    robot: ET.Element,
+    link: Link,
+    hinge: Hinge,
+    parent: str,
+    child: str,
+    xyz: ndarray,
+    upper_deg: Mapping[str, float],
 ) -> None:
     mirror = -1 if link.side < 0 else 1
     prefix = {1: "l_", -1: "r_", 0: ""}[link.side]
-    name = f"{prefix}{JOINT_OF_SEGMENT[link.segment.name]}_{hinge.name}"
+    stem = f"{JOINT_OF_SEGMENT[link.segment.name]}_{hinge.name}"
+    name = prefix + stem
     joint = ET.SubElement(robot, "joint", name=name, type="revolute")
     yaw = math.radians(hinge.yaw_deg) * mirror
     ET.SubElement(joint, "origin", xyz=_text(xyz), rpy=_text((0, 0, yaw)))
@@ -68,7 +76,7 @@ def _hinge_joint(
         joint,
         "limit",
         lower=f"{math.radians(hinge.lower_deg - LIMIT_MARGIN_DEG):.6f}",
-        upper=f"{math.radians(hinge.upper_deg + LIMIT_MARGIN_DEG):.6f}",
+        upper=f"{math.radians(upper_deg.get(stem, hinge.upper_deg) + LIMIT_MARGIN_DEG):.6f}",
         effort=f"{EFFORT_NM:g}",
         velocity=f"{VELOCITY_RAD_S:g}",
     )
@@ -79,6 +87,7 @@ def human_urdf(
     extra_points: dict[str, tuple[str, ndarray]],
     bodies: dict[str, SegmentBody],
     visuals: dict[str, str],
+    upper_deg: Mapping[str, float] | None = None,
 ) -> str:
     """The URDF text.
 
@@ -87,6 +96,7 @@ def human_urdf(
         extra_points: Fixed frames: name -> (link, position in that link's frame [m]).
         bodies: Rigid-body data per link.
         visuals: Mesh file per link, relative to the URDF.
+        upper_deg: Hinge without side -> end of its range, where it is not the published one [deg].
 
     Returns:
         Indented XML.
@@ -103,7 +113,8 @@ def human_urdf(
                 if not last:
                     body = ET.SubElement(robot, "link", name=child)
                     _inertial(body, DUMMY_MASS_KG, np.zeros(3), np.eye(3) * 1e-6)
-                _hinge_joint(robot, link, hinge, parent, child, offset if i == 0 else np.zeros(3))
+                at = offset if i == 0 else np.zeros(3)
+                _hinge_joint(robot, link, hinge, parent, child, at, upper_deg or {})
                 parent = child
         body = ET.SubElement(robot, "link", name=link.name)
         data = bodies[link.name]

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the body is thought to be between frames, and how sure that is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy import ndarray
+
+from kintrack.body import Body
+from kintrack.config import MotionConfig
+from kintrack.human import motion_sigma
+from kintrack.residuals.prior import TangentPrior, diagonal_prior
+
+
+@dataclass(frozen=True)
+class Belief:
+    """A pose with its motion, covariance and history."""
+
+    q: Float[ndarray, " nq"]
+    """Configuration."""
+    velocity: Float[ndarray, " nv"]
+    """Tangent velocity [m/s, rad/s]."""
+    covariance: Float[ndarray, "nv nv"]
+    """Covariance in the tangent space at q."""
+    timestamp_s: float
+    """When [s]."""
+    habit: Float[ndarray, " nv"]
+    """Mean hinge angles of the last seconds [rad]; a hidden limb returns there."""
+    hidden: Bool[ndarray, " nv"]
+    """Hinges that were hidden."""
+    misses: int = 0
+    """Bad frames in a row."""
+
+    def step_s(self, timestamp_s: float) -> float:
+        """Time from here to a later frame, at least a millisecond [s]."""
+        return max(timestamp_s - self.timestamp_s, 1e-3)
+
+
+def first(
+    q: Float[ndarray, " nq"], covariance: Float[ndarray, "nv nv"], timestamp_s: float
+) -> Belief:
+    """A belief without history."""
+    nv = len(covariance)
+    none = np.zeros(nv, dtype=bool)
+    return Belief(q, np.zeros(nv), covariance, timestamp_s, _angles(q), none)
+
+
+def predict(
+    body: Body, belief: Belief, timestamp_s: float, motion: MotionConfig
+) -> Float[ndarray, " nq"]:
+    """Constant velocity within the limits; hidden hinges return to the posture held before."""
+    dt = belief.step_s(timestamp_s)
+    q = body.integrate(belief.q, belief.velocity * motion.damping * dt)
+    hinges = belief.hidden[6:]
+    back = -np.expm1(-dt / motion.hidden_s)
+    q[7:][hinges] += back * (belief.habit[6:] - q[7:])[hinges]
+    q[7:] = np.clip(q[7:], body.lower[6:], body.upper[6:])
+    return q
+
+
+def spread(
+    body: Body,
+    belief: Belief,
+    hidden: Bool[ndarray, " nv"],
+    timestamp_s: float,
+    motion: MotionConfig,
+    rest_sigma: Float[ndarray, " nv"],
+) -> Float[ndarray, "nv nv"]:
+    """How sure the prediction is: a hinge in view may go anywhere near, a hidden one strays.
+
+    It drifts as a particle on a spring does (Uhlenbeck and Ornstein 1930): its variance goes to
+    that of the pose prior with the time constant `hidden_s`. What the others do says nothing about
+    it.
+
+    Args:
+        body: The body.
+        belief: The last one.
+        hidden: Hinges that are hidden now.
+        timestamp_s: Now [s].
+        motion: Speeds and times.
+        rest_sigma: Standard deviation of every hinge about rest [rad].
+
+    Returns:
+        Covariance of the prediction, tangent space.
+    """
+    dt = belief.step_s(timestamp_s)
+    added = motion_sigma(body, motion, dt) ** 2
+    kept = np.exp(-2 * dt / motion.hidden_s)
+    covariance = np.where(hidden[:, None] == hidden, belief.covariance, 0.0)
+    covariance[np.ix_(hidden, hidden)] *= kept
+    added[hidden] = (1 - kept) * rest_sigma[hidden] ** 2
+    return covariance + np.diag(added)
+
+
+def rest_prior(
+    resting: Float[ndarray, " nq"],
+    sigma: Float[ndarray, " nv"],
+    unseen: Bool[ndarray, " nv"],
+    hidden: Bool[ndarray, " nv"],
+    frames: float,
+) -> TangentPrior:
+    """Towards rest; slowly for limbs that were not found, not at all for hidden ones.
+
+    Args:
+        resting: Posture at rest.
+        sigma: Standard deviation of every hinge about it [rad].
+        unseen: Hinges that were not found.
+        hidden: Hinges that are hidden.
+        frames: In so many frames a limb that is not found relaxes.
+    """
+    sigma = np.where(unseen, sigma * np.sqrt(max(frames, 1.0)), sigma)
+    return diagonal_prior(resting, np.where(hidden, np.inf, sigma))
+
+
+def updated(
+    body: Body,
+    belief: Belief,
+    q: Float[ndarray, " nq"],
+    covariance: Float[ndarray, "nv nv"],
+    unseen: Bool[ndarray, " nv"],
+    hidden: Bool[ndarray, " nv"],
+    timestamp_s: float,
+    motion: MotionConfig,
+) -> Belief:
+    """The belief after a frame; hinges not seen slow down and teach nothing.
+
+    Args:
+        body: The body.
+        belief: The last one.
+        q: Pose found in the frame.
+        covariance: Its covariance.
+        unseen: Hinges that were not found.
+        hidden: Hinges that were hidden.
+        timestamp_s: When [s].
+        motion: Speeds and times.
+    """
+    dt, lost = belief.step_s(timestamp_s), unseen | hidden
+    velocity = body.difference(belief.q, q) / dt
+    velocity[lost] = motion.damping * belief.velocity[lost]
+    learnt = np.where(lost, 0.0, -np.expm1(-dt / motion.habit_s))
+    habit = belief.habit + learnt * (_angles(q) - belief.habit)
+    return Belief(q, velocity, covariance, timestamp_s, habit, hidden)
+
+
+def coasted(
+    body: Body,
+    belief: Belief,
+    timestamp_s: float,
+    motion: MotionConfig,
+    rest_sigma: Float[ndarray, " nv"],
+) -> Belief:
+    """The belief after a frame that showed nothing of the person, see `spread`."""
+    hidden = np.arange(body.nv) >= 6
+    return replace(
+        belief,
+        q=predict(body, belief, timestamp_s, motion),
+        velocity=motion.damping * belief.velocity,
+        covariance=spread(body, belief, hidden, timestamp_s, motion, rest_sigma),
+        timestamp_s=timestamp_s,
+        hidden=hidden,
+    )
+
+
+def _angles(q: Float[ndarray, " nq"]) -> Float[ndarray, " nv"]:
+    """Hinge angles in the order of the tangent space, 0 for the root."""
+    return np.concatenate([np.zeros(6), q[7:]])

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A person from a recording that has been tracked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from kintrack.association.observation import observe, within
+from kintrack.body import run_kinematics
+from kintrack.calibration.calibrator import CalibrationConfig, Calibrator
+from kintrack.calibration.person import Person
+from kintrack.calibration.selection import varied
+from kintrack.config import TrackerConfig
+from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
+from kintrack.human import Human
+from kintrack.result import Track
+from kintrack.segmenter import Segmenter, checked_labels
+from kintrack.sequence.frame import SequenceReader
+from kintrack.skin import skinned_vertices
+
+MARGIN_M = 0.12
+"""Without labels, points further than this from the tracked body's box are not the person's [m]."""
+
+
+def calibrate_recording(
+    sequence: SequenceReader,
+    track: Track,
+    human: Human,
+    T_world_camera: Float[ndarray, "4 4"] = T_LEVEL_WORLD_CAMERA,
+    segmenter: Segmenter | None = None,
+    config: CalibrationConfig | None = None,
+    tracker: TrackerConfig | None = None,
+    stated_height_m: float | None = None,
+    on_frame: Callable[[int], None] = lambda index: None,
+) -> Person:
+    """Calibrate the person of a recording from a few varied frames of its track.
+
+    Args:
+        sequence: The recording.
+        track: Its track.
+        human: With whom it was tracked.
+        T_world_camera: Camera pose it was tracked with.
+        segmenter: Tells the person from what is around; None for a recording of her alone.
+        config: How to calibrate.
+        tracker: Association and pose priors.
+        stated_height_m: Height of the person, if somebody knows it [m].
+        on_frame: Called with every frame's number once it is read.
+
+    Returns:
+        The person, or the template with the reasons why.
+
+    Raises:
+        CalibrationError: if no frame is tracked or the stated height is impossible.
+    """
+    calibrator = Calibrator(human, T_world_camera, config, tracker, stated_height_m)
+    a = calibrator.tracker.association
+    good = np.flatnonzero(track.status == "tracking")
+    seen = track.joint_visible[good].mean(axis=1)
+    wanted = varied(track.joint_positions_camera_m[good], seen, calibrator.config.frames)
+    for n in wanted:
+        frame = sequence.frame(int(good[n]))
+        on_frame(frame.index)
+        if frame.problem is not None or frame.depth_m is None:
+            continue
+        labels = None if segmenter is None else checked_labels(segmenter, frame)
+        observation = observe(frame, a.max_width_px, a.background_share, labels)
+        q = track.q[good[n]]
+        skin = skinned_vertices(run_kinematics(human.body, q), human.skin)
+        seen_from = transform_points(invert_rigid(T_world_camera), skin)
+        box = np.stack([seen_from.min(axis=0) - MARGIN_M, seen_from.max(axis=0) + MARGIN_M])
+        calibrator.add(frame.index, within(observation, box), q, float(seen[n]))
+    return calibrator.result()

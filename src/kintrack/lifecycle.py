@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Initialising, tracking, lost: a small machine that looks only at numbers.
+
+        a frame good enough to begin with              `patience` bad frames in a row
+initialising ---------------------------> tracking ---------------------------------> lost
+                                              ^                                        |
+                                              +------ a frame good enough to begin ----+
+
+To begin takes a better frame than to go on (hysteresis), and a track that has only just begun is
+given up sooner. Nobody in view is a reason, not an error.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+from kintrack.config import check_bounds
+
+NOBODY = "nobody in view"
+HIDDEN = "hardly anything of the person is seen"
+SOMEBODY_ELSE = "somebody else is in view; the lost person may still be hidden"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a frame must satisfy; labels count only where there are some."""
+
+    max_rms_m: float
+    """Largest surface residual [m]."""
+    min_explained: float
+    """Least share of the person's points near the skin."""
+    min_supported: float
+    """Least share of the skin that should be seen and has a point near it."""
+    min_labels: float
+    """Least share of skin seen on the person whose label is the pixel's."""
+
+    def __post_init__(self) -> None:
+        check_bounds(
+            self,
+            max_rms_m=(1e-3, 1),
+            min_explained=(0, 1),
+            min_supported=(0, 1),
+            min_labels=(0, 1),
+        )
+
+
+@dataclass(frozen=True)
+class LifecycleConfig:
+    """When tracking begins and ends."""
+
+    begin: Limits = field(default_factory=lambda: Limits(0.025, 0.7, 0.45, 0.55))
+    """What a first pose must satisfy."""
+    stay: Limits = field(default_factory=lambda: Limits(0.03, 0.5, 0.25, 0.35))
+    """What every further frame must satisfy."""
+    patience: int = 6
+    """Bad frames in a row that end a track."""
+    young: int = 10
+    """A track with fewer good frames than this is young."""
+    young_patience: int = 3
+    """Bad frames in a row that end a young track."""
+    retry: int = 2
+    """After a first pose was rejected, so many frames pass before the next is tried."""
+
+    def __post_init__(self) -> None:
+        check_bounds(
+            self, patience=(1, 1000), young=(0, 1000), young_patience=(1, 1000), retry=(0, 1000)
+        )
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What one frame says."""
+
+    rms_m: float
+    """Surface residual [m]; NaN if nothing could be fitted."""
+    explained: float
+    """Share of the person's points near the skin."""
+    supported: float
+    """Share of the skin that should be seen and has a point near it."""
+    labels: float = 1.0
+    """Share of skin seen on the person whose label is the pixel's; 1 without labels."""
+
+
+@dataclass(frozen=True)
+class Life:
+    """Where the machine is."""
+
+    status: str = "initialising"
+    """`initialising`, `tracking` or `lost`."""
+    reason: str | None = NOBODY
+    """Why it is not tracking, or what is wrong with the last frame; None if nothing is."""
+    good: int = 0
+    """Good frames since tracking began."""
+    bad: int = 0
+    """Bad frames in a row."""
+    wait: int = 0
+    """Frames to pass before the next first pose is tried."""
+
+    @property
+    def tracks(self) -> bool:
+        """True if there is a pose to go on from."""
+        return self.status == "tracking"
+
+    @property
+    def may_begin(self) -> bool:
+        """True if a first pose should be tried now."""
+        return not self.tracks and self.wait == 0
+
+
+def absent(life: Life, config: LifecycleConfig, reason: str = NOBODY) -> Life:
+    """The next state after a frame in which there was nothing to fit.
+
+    Args:
+        life: The state before.
+        config: When a track ends.
+        reason: What was missing.
+    """
+    if life.tracks:
+        return _worse(life, config, reason)
+    return replace(life, reason=reason, wait=max(life.wait - 1, 0))
+
+
+def judged(life: Life, reading: Reading, config: LifecycleConfig) -> Life:
+    """The next state after a frame with a fit, be it of a track or a first pose.
+
+    Args:
+        life: The state before.
+        reading: What the frame says.
+        config: Limits and patience.
+    """
+    wrong = objection(reading, config.stay if life.tracks else config.begin)
+    if life.tracks:
+        if wrong is not None:
+            return _worse(life, config, wrong)
+        return replace(life, reason=None, good=life.good + 1, bad=0)
+    if wrong is not None:
+        return replace(life, reason=wrong, wait=config.retry)
+    return Life("tracking", None, good=1)
+
+
+def objection(reading: Reading, limits: Limits) -> str | None:
+    """What speaks against a frame in words; None if nothing does."""
+    if not math.isfinite(reading.rms_m):
+        return HIDDEN
+    if reading.rms_m > limits.max_rms_m:
+        return f"residual {1e3 * reading.rms_m:.0f} mm; {1e3 * limits.max_rms_m:.0f} are allowed"
+    for share, least, what in (
+        (reading.explained, limits.min_explained, "of the person's points lie on the skin"),
+        (reading.supported, limits.min_supported, "of the skin is seen where it should be"),
+        (reading.labels, limits.min_labels, "of the skin lies on pixels of its own part"),
+    ):
+        if not share >= least:
+            return f"{share:.0%} {what}; {least:.0%} are needed"
+    return None
+
+
+def _worse(life: Life, config: LifecycleConfig, reason: str) -> Life:
+    """One more bad frame of a track."""
+    bad = life.bad + 1
+    if bad >= (config.young_patience if life.good < config.young else config.patience):
+        return Life("lost", reason)
+    return replace(life, reason=reason, bad=bad)

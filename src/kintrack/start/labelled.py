@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A start from part labels: any place, any heading, any posture, and not all of the person.
+
+Every heading and several trunks are put onto the labelled points with the limbs that suit them best
+(`placing`). The few best are fitted like any frame, only from further away, and the one whose skin
+and labels agree best with what is seen is kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from kintrack.alignment import Fit, View, fit_pose, view_skin
+from kintrack.association.observation import Observation
+from kintrack.body import run_kinematics
+from kintrack.config import TrackerConfig, check_bounds
+from kintrack.errors import AssociationError
+from kintrack.geometry import invert_rigid
+from kintrack.human import Human, prior_sigma
+from kintrack.judge import agreement
+from kintrack.people import PeopleConfig, choose, find_people, only
+from kintrack.residuals.prior import diagonal_prior
+from kintrack.sides import settle_sides
+from kintrack.start.begun import Start
+from kintrack.start.evidence import evidence_of
+from kintrack.start.placing import guesses, view_mismatch
+from kintrack.start.postures import postures_of
+
+
+@dataclass(frozen=True)
+class LabelledStartConfig:
+    """A start from labels."""
+
+    people: PeopleConfig = field(default_factory=PeopleConfig)
+    """What parts people."""
+    headings: int = 12
+    """Headings tried, evenly over the circle."""
+    fitted: int = 3
+    """The best so many guesses are fitted."""
+    gate_m: float = 0.25
+    """Largest distance in the first rounds of a fit [m]."""
+    rounds: int = 5
+    """Associations of each fit."""
+    last_rounds: int = 6
+    """Further associations of the best fit."""
+    tilt_rad: float = 0.5
+    """How far the pelvis may lean from where a guess has it [rad]."""
+    side_m: float = 0.04
+    """How far a label's left or right is believed against the geometry [m]."""
+
+    def __post_init__(self) -> None:
+        check_bounds(
+            self,
+            headings=(4, 72),
+            fitted=(1, 20),
+            gate_m=(0.02, 2),
+            rounds=(1, 100),
+            last_rounds=(1, 100),
+            tilt_rad=(0.01, 10),
+            side_m=(0, 10),
+        )
+
+
+def start_from_labels(
+    human: Human,
+    observation: Observation,
+    T_world_camera: Float[ndarray, "4 4"],
+    config: TrackerConfig,
+    start: LabelledStartConfig | None = None,
+    near_world: Float[ndarray, " 3"] | None = None,
+) -> Start | None:
+    """Find a labelled person and fit the body, whatever the pose.
+
+    Args:
+        human: Body and skin.
+        observation: Labelled points; may show several people.
+        T_world_camera: Camera pose.
+        config: All weights.
+        start: How many headings and fits.
+        near_world: Where the person was last [m]; None for whoever is nearest.
+
+    Returns:
+        The best start with the observation of that person alone; None if nobody is in view or
+        nothing can be fitted.
+    """
+    start = LabelledStartConfig() if start is None else start
+    body = choose(find_people(observation, T_world_camera, start.people), near_world)
+    if body is None:
+        return None
+    return start_at(human, only(observation, body), T_world_camera, config, start)
+
+
+def start_at(
+    human: Human,
+    seen: Observation,
+    T_world_camera: Float[ndarray, "4 4"],
+    config: TrackerConfig,
+    start: LabelledStartConfig,
+) -> Start | None:
+    """Fit the body to one person's labelled points, see `start_from_labels`."""
+    evidence = evidence_of(seen, T_world_camera)
+    tries = guesses(
+        postures_of(human), evidence, start.headings, start.side_m, len(human.skin.labels)
+    )
+    T_camera_world = invert_rigid(T_world_camera)
+    last = config.association.last_gate_m
+    gates = np.geomspace(start.gate_m, last, start.rounds).tolist()
+
+    def settled(view: View) -> Observation:
+        return settle_sides(seen, view.vertices_camera, view.visible, view.labels, start.side_m)
+
+    def fitted(q: ndarray, gates: list[float]) -> tuple[float, Fit, View] | None:
+        sigma = prior_sigma(human.body, config.prior)
+        sigma[3:5] = start.tilt_rad
+        prior = diagonal_prior(q, sigma)
+        view = view_skin(human, run_kinematics(human.body, q), T_camera_world, seen, config)
+        try:
+            fit = fit_pose(human, settled(view), q, [prior], T_world_camera, config, gates)
+        except AssociationError:
+            return None
+        view = view_skin(human, fit.state, T_camera_world, seen, config)
+        return view_mismatch(view, evidence, start.side_m), fit, view
+
+    best, least = None, np.inf
+    for guess in tries[: start.fitted]:
+        found = fitted(guess.q, gates)
+        if found is not None and found[0] + guess.unrest_m2 < least:
+            best, least = found, found[0] + guess.unrest_m2
+    if best is None:
+        return None
+    best = fitted(best[1].state.q, [last] * start.last_rounds)
+    if best is None:
+        return None
+    cost, fit, view = best
+    agreed = agreement(view, settled(view), config.judge.explained_m)
+    return Start(fit, agreed, seen, cost)

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who is who from frame to frame: the person who is followed, and everybody else.
+
+While the person is tracked, everybody else in view is remembered with place and speed. Once he is
+lost, people in view are first matched to those others; who is left, and near enough to where he was
+lost, is taken to be him. After a while of waiting anybody is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from kintrack.config import check_bounds
+from kintrack.people import Somebody, choose
+
+REFUSED_SHARE = 0.25
+"""Instead of somebody who could not be fitted, people are tried who show this share of the most."""
+
+
+@dataclass(frozen=True)
+class WhereaboutsConfig:
+    """How far people get while nobody sees them."""
+
+    reach_m: float = 0.6
+    """A place is known this well [m]."""
+    walk_m_s: float = 1.2
+    """How fast somebody who is not seen may move away from where he is expected [m/s]."""
+    other_m_s: float = 2.0
+    """The same for the others, who are seen more often [m/s]."""
+    carry_s: float = 0.5
+    """How long a speed is carried on [s]."""
+    hold_s: float = 4.0
+    """So long after a loss nobody who may be somebody else is taken [s]."""
+    forget_s: float = 8.0
+    """Others not seen for this long are forgotten [s]."""
+    refuse_s: float = 1.0
+    """So long after somebody could not be fitted anybody else is tried first [s]."""
+
+    def __post_init__(self) -> None:
+        check_bounds(
+            self,
+            reach_m=(0.05, 10),
+            walk_m_s=(0, 20),
+            other_m_s=(0, 20),
+            carry_s=(0, 10),
+            hold_s=(0, 1e4),
+            forget_s=(0, 1e4),
+            refuse_s=(0, 1e4),
+        )
+
+
+@dataclass(frozen=True)
+class Known:
+    """A person seen before."""
+
+    place_world: Float[ndarray, " 3"]
+    """Where [m]."""
+    velocity: Float[ndarray, " 3"]
+    """How fast [m/s]."""
+    seen_s: float
+    """When [s]."""
+
+    def expected(self, timestamp_s: float, carry_s: float) -> Float[ndarray, " 3"]:
+        """Where he is expected by now [m]."""
+        dt = min(max(timestamp_s - self.seen_s, 0.0), carry_s)
+        return self.place_world + dt * self.velocity
+
+    def moved(self, place_world: Float[ndarray, " 3"], timestamp_s: float) -> Known:
+        """The same person seen again; the speed is smoothed over a quarter of a second."""
+        dt = max(timestamp_s - self.seen_s, 1e-3)
+        share = min(dt / 0.25, 1.0)
+        speed = (place_world - self.place_world) / max(dt, 0.02)
+        return Known(place_world, (1 - share) * self.velocity + share * speed, timestamp_s)
+
+
+@dataclass(frozen=True)
+class Whereabouts:
+    """Everybody of whom something is known."""
+
+    own: Known | None = None
+    """The person who is, or was, followed."""
+    others: tuple[Known, ...] = ()
+    """Everybody else."""
+    refused: Known | None = None
+    """Whoever was tried last and could not be fitted."""
+
+
+def follow(
+    where: Whereabouts,
+    own: Somebody | None,
+    people: tuple[Somebody, ...],
+    timestamp_s: float,
+    config: WhereaboutsConfig,
+) -> Whereabouts:
+    """What is known after a frame in which the person was tracked.
+
+    Args:
+        where: What was known before.
+        own: The person, one of `people`; None if he was not told apart in this frame.
+        people: Everybody in view.
+        timestamp_s: When [s].
+        config: How far people get.
+    """
+    known = where.own
+    if own is not None:
+        place = own.place_world
+        at_rest = Known(place, np.zeros(3), timestamp_s)
+        known = at_rest if known is None else known.moved(place, timestamp_s)
+    rest = [body for body in people if body is not own]
+    return Whereabouts(known, _others(where, rest, timestamp_s, config))
+
+
+def seek(
+    where: Whereabouts,
+    people: tuple[Somebody, ...],
+    timestamp_s: float,
+    config: WhereaboutsConfig,
+) -> tuple[Whereabouts, Somebody | None]:
+    """Who of the people in view is the lost person.
+
+    Args:
+        where: What was known before.
+        people: Everybody in view.
+        timestamp_s: When [s].
+        config: How far people get.
+
+    Returns:
+        What is known now, and the person to start on: anybody if nobody was followed before or
+        the wait is over, else whoever is near enough and not known to be somebody else; None if
+        there is nobody like that.
+    """
+    own = where.own
+    if own is None or timestamp_s - own.seen_s > config.hold_s:
+        tried = _not_refused(where, people, timestamp_s, config) or people
+        found = choose(tried) if own is None else choose(_large(tried), own.place_world)
+        rest = [body for body in people if body is not found]
+        return replace(where, others=_others(where, rest, timestamp_s, config)), found
+    found = None
+    gone_s = timestamp_s - own.seen_s
+    pairs = _pairs(where.others, people, timestamp_s, config)
+    reach = config.reach_m + config.walk_m_s * gone_s
+    for n, body in enumerate(people):
+        away = float(np.linalg.norm(body.place_world - own.expected(timestamp_s, config.carry_s)))
+        if away <= reach:
+            pairs.append((away / reach, -1, n))
+    matched: dict[int, int] = {}
+    for _, who, n in sorted(pairs):
+        if who not in matched and n not in matched.values():
+            matched[who] = n
+    if -1 in matched:
+        found = people[matched[-1]]
+    rest = [body for body in people if body is not found]
+    return replace(where, others=_others(where, rest, timestamp_s, config)), found
+
+
+def refuse(where: Whereabouts, body: Somebody, timestamp_s: float) -> Whereabouts:
+    """What is known after a first pose of somebody was rejected."""
+    return replace(where, refused=Known(body.place_world, np.zeros(3), timestamp_s))
+
+
+def mine(
+    where: Whereabouts, people: tuple[Somebody, ...], timestamp_s: float, config: WhereaboutsConfig
+) -> Somebody | None:
+    """Who of the people in view is the person who was tracked until the last frame."""
+    own = where.own
+    if own is None:
+        return None
+    pairs = _pairs((own, *where.others), people, timestamp_s, config)
+    matched: dict[int, int] = {}
+    for _, who, n in sorted(pairs):
+        if who not in matched and n not in matched.values():
+            matched[who] = n
+    return people[matched[0]] if 0 in matched else None
+
+
+def _not_refused(
+    where: Whereabouts, people: tuple[Somebody, ...], timestamp_s: float, config: WhereaboutsConfig
+) -> tuple[Somebody, ...]:
+    """People other than the one who could not be fitted a moment ago."""
+    refused = where.refused
+    if refused is None or timestamp_s - refused.seen_s > config.refuse_s:
+        return people
+    place = refused.place_world
+    return tuple(
+        body
+        for body in people
+        if np.linalg.norm(body.place_world - place) > config.reach_m
+        and body.area_m2 >= REFUSED_SHARE * max(other.area_m2 for other in people)
+    )
+
+
+def _large(people: tuple[Somebody, ...]) -> tuple[Somebody, ...]:
+    """Those who show at least half as much as the one who shows most."""
+    most = max((body.area_m2 for body in people), default=0.0)
+    return tuple(body for body in people if body.area_m2 >= 0.5 * most)
+
+
+def _pairs(
+    known: tuple[Known, ...],
+    people: tuple[Somebody, ...],
+    timestamp_s: float,
+    config: WhereaboutsConfig,
+) -> list[tuple[float, int, int]]:
+    """Distance over reach, index of the known person, index of the person in view."""
+    pairs = []
+    for who, other in enumerate(known):
+        reach = config.reach_m + config.other_m_s * max(timestamp_s - other.seen_s, 0.0)
+        place = other.expected(timestamp_s, config.carry_s)
+        for n, body in enumerate(people):
+            away = float(np.linalg.norm(body.place_world - place))
+            if away <= reach:
+                pairs.append((away / reach, who, n))
+    return pairs
+
+
+def _others(
+    where: Whereabouts, rest: list[Somebody], timestamp_s: float, config: WhereaboutsConfig
+) -> tuple[Known, ...]:
+    """The others after a frame that shows `rest` of them."""
+    others = tuple(o for o in where.others if timestamp_s - o.seen_s <= config.forget_s)
+    matched: dict[int, int] = {}
+    for _, who, n in sorted(_pairs(others, tuple(rest), timestamp_s, config)):
+        if who not in matched and n not in matched.values():
+            matched[who] = n
+    known = [
+        other.moved(rest[matched[who]].place_world, timestamp_s) if who in matched else other
+        for who, other in enumerate(others)
+    ]
+    new = [body for n, body in enumerate(rest) if n not in matched.values()]
+    return (*known, *(Known(body.place_world, np.zeros(3), timestamp_s) for body in new))

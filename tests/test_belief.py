@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+import numpy as np
+import pytest
+
+from kintrack.belief import coasted, first, predict, spread, updated
+from kintrack.config import MotionConfig, PriorConfig
+from kintrack.human import prior_sigma
+
+MOTION = MotionConfig()
+DT_S = 1 / 30
+
+
+@pytest.fixture(scope="module")
+def sigma(body):
+    return prior_sigma(body, PriorConfig())
+
+
+@pytest.fixture
+def belief(body, scene):
+    return first(scene.place({"elbow_flexion": 40}), 1e-4 * np.eye(body.nv), 0.0)
+
+
+def hinges(body, *names):
+    out = np.zeros(body.nv, dtype=bool)
+    out[[body.dof(name) for name in names]] = True
+    return out
+
+
+def test_a_hidden_hinge_is_less_sure_every_frame_but_never_worse_than_the_prior(
+    body, belief, sigma
+):
+    knee = body.dof("l_knee_flexion")
+    variances = []
+    for i in range(300):
+        belief = coasted(body, belief, (i + 1) * DT_S, MOTION, sigma)
+        variances.append(belief.covariance[knee, knee])
+    assert (np.diff(variances) > 0).all()
+    assert variances[0] < 0.1 * sigma[knee] ** 2
+    assert variances[-1] == pytest.approx(sigma[knee] ** 2, rel=0.01)
+
+
+def test_what_is_seen_says_nothing_about_a_hidden_hinge(body, belief, sigma):
+    hidden = hinges(body, "l_knee_flexion")
+    root = np.random.default_rng(0).normal(0, 0.1, (body.nv, body.nv))
+    correlated = first(belief.q, root @ root.T, 0.0)
+    covariance = spread(body, correlated, hidden, DT_S, MOTION, sigma)
+    assert not covariance[np.ix_(hidden, ~hidden)].any()
+    assert np.linalg.eigvalsh(covariance).min() > 0
+
+
+def test_a_moving_limb_that_hides_comes_to_rest_and_returns_to_its_habit(body, belief, sigma):
+    knee = body.dof("l_knee_flexion")
+    bent = body.integrate(belief.q, 0.2 * hinges(body, "l_knee_flexion"))
+    none = np.zeros(body.nv, dtype=bool)
+    moving = updated(body, belief, bent, belief.covariance, none, none, DT_S, MOTION)
+    assert moving.velocity[knee] == pytest.approx(0.2 / DT_S)
+    angles = []
+    for i in range(150):
+        moving = coasted(body, moving, (i + 2) * DT_S, MOTION, sigma)
+        angles.append(moving.q[knee + 1])
+    start = belief.q[knee + 1]
+    assert max(angles) < start + 0.8
+    assert abs(angles[-1] - start) < 0.03
+
+
+def test_hidden_hinges_teach_no_habit_and_seen_ones_do(body, belief):
+    moved = body.integrate(belief.q, 0.3 * hinges(body, "l_knee_flexion", "r_knee_flexion"))
+    hidden = hinges(body, "l_knee_flexion")
+    none = np.zeros(body.nv, dtype=bool)
+    after = updated(body, belief, moved, belief.covariance, none, hidden, DT_S, MOTION)
+    learnt = after.habit - belief.habit
+    assert learnt[body.dof("l_knee_flexion")] == 0
+    assert learnt[body.dof("r_knee_flexion")] == pytest.approx(0.3 * (1 - np.exp(-DT_S)), rel=1e-6)
+
+
+def test_a_prediction_stays_within_the_limits(body, belief):
+    fast = first(belief.q, belief.covariance, 0.0)
+    fast.velocity[6:] = 500.0
+    q = predict(body, fast, DT_S, MOTION)
+    assert (q[7:] <= body.upper[6:]).all() and (q[7:] >= body.lower[6:]).all()
