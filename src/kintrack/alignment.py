@@ -116,6 +116,7 @@ def fit_pose(
             gate_m,
             config.association.pixel_pairs,
             view.labels,
+            config.association.part_m,
         )
         beside = outside_pairs(
             outline,

@@ -55,6 +55,9 @@ class AssociationConfig:
     pixel is free space; with more, an empty pixel is the sensor's failure and says nothing."""
     region_margin_m: float = 0.35
     """Observed points further than this from the predicted body's box are ignored [m]."""
+    part_m: float = 0.08
+    """Skin pairs with a pixel of another part as if that were further away by this, squares added;
+    never with background. 10 for the hard gate of the paper [m]."""
     side_m: float = 0.08
     """A limb's pixel goes to the other side's limb if that is nearer by about this [m]."""
 
@@ -73,6 +76,7 @@ class AssociationConfig:
             pixel_pairs=(0, 20_000),
             background_share=(0.0, 1.0),
             region_margin_m=(0.05, 5.0),
+            part_m=(0.0, 10.0),
             side_m=(0.0, 10.0),
         )
 

@@ -19,6 +19,7 @@ from kintrack.skin import skinned_vertices
 CAMERA = PinholeCamera(64, 48, 60.0, 61.0, 31.5, 23.5)
 GATE_M = 0.12
 """At 1.2 m this is a window of 6 px each side, below `MAX_HALF_WINDOW`: nothing is skipped."""
+HARD = 10.0
 ANY = np.ones(400, dtype=np.uint8)
 """Labels of the vertices; they count only where the observation is labelled."""
 
@@ -156,7 +157,7 @@ def labelled(cloud):
 def test_only_equal_labels_pair_in_both_directions(labelled, vertices):
     part = np.random.default_rng(6).integers(1, 4, len(vertices)).astype(np.uint8)
     seen = np.ones(len(vertices), dtype=bool)
-    pairs = associate(labelled, vertices, seen, GATE_M, GATE_M, 500, part)
+    pairs = associate(labelled, vertices, seen, GATE_M, GATE_M, 500, part, HARD)
     label_of = {
         tuple(p): label
         for p, label in zip(
@@ -171,7 +172,7 @@ def test_only_equal_labels_pair_in_both_directions(labelled, vertices):
 def test_a_gated_pixel_takes_the_nearest_vertex_of_its_own_part(labelled, vertices):
     part = np.random.default_rng(6).integers(1, 4, len(vertices)).astype(np.uint8)
     seen = np.ones(len(vertices), dtype=bool)
-    pairs = associate(labelled, vertices, seen, GATE_M, 0.15, 500, part)
+    pairs = associate(labelled, vertices, seen, GATE_M, 0.15, 500, part, HARD)
     points, labels = sample_region(labelled, 500)
     distance = np.linalg.norm(points[:, None] - vertices[None], axis=-1)
     distance[labels[:, None] != part[None]] = np.inf
@@ -179,7 +180,25 @@ def test_a_gated_pixel_takes_the_nearest_vertex_of_its_own_part(labelled, vertic
     assert np.array_equal(pairs.vertex[pairs.from_skin :], distance.argmin(axis=1)[near])
 
 
+@pytest.mark.parametrize("part_m", [0.0, 0.03, 0.08])
+def test_a_pair_of_two_parts_counts_as_longer(labelled, vertices, part_m):
+    part = np.random.default_rng(6).integers(1, 4, len(vertices)).astype(np.uint8)
+    seen = np.ones(len(vertices), dtype=bool)
+    pairs = associate(labelled, vertices, seen, GATE_M, 0.15, 500, part, part_m)
+    points, labels = sample_region(labelled, 500)
+    distance = np.linalg.norm(points[:, None] - vertices[None], axis=-1)
+    distance = np.hypot(distance, part_m * (labels[:, None] != part[None]))
+    near = distance.min(axis=1) < 0.15
+    assert np.array_equal(pairs.vertex[pairs.from_skin :], distance.argmin(axis=1)[near])
+    flat, label = labelled.points_camera.reshape(-1, 3), labelled.labels.ravel()
+    label_of = {tuple(p): n for p, n in zip(flat, label, strict=True)}
+    found = np.array([label_of[tuple(p)] for p in pairs.points_camera[: pairs.from_skin]])
+    assert (found > 0).all() and (found != part[pairs.vertex[: pairs.from_skin]]).any()
+    gap = np.linalg.norm(pairs.points_camera - vertices[pairs.vertex], axis=1)[: pairs.from_skin]
+    assert (np.hypot(gap, part_m * (found != part[pairs.vertex[: pairs.from_skin]])) < GATE_M).all()
+
+
 def test_a_part_that_nobody_labelled_does_not_pair(labelled, vertices):
     seen = np.ones(len(vertices), dtype=bool)
-    pairs = associate(labelled, vertices, seen, GATE_M, GATE_M, 500, 6 * ANY)
+    pairs = associate(labelled, vertices, seen, GATE_M, GATE_M, 500, 6 * ANY, HARD)
     assert len(pairs.vertex) == 0

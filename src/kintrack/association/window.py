@@ -4,11 +4,13 @@
 Skin to pixels: every visible vertex projects into the depth image and takes the nearest observed
 3-D point in a window around that pixel. Pixels to skin: a regular subset of the observed pixels
 takes the nearest visible vertex, so that an arm which the model does not cover pulls it back.
-Where the image is labelled, only equal labels pair, in both directions [Wan19].
+Where the image is labelled, background never pairs [Wan19]. A pair of two different parts counts as
+longer than it is: with true labels that is as good as forbidding it, and a network errs.
 """
 
 from __future__ import annotations
 
+import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -34,6 +36,8 @@ class Pairs(NamedTuple):
     """How many of the pairs were found from the skin; they come first."""
 
 
+PART_M = 0.08
+"""Networks take one part for another: so far apart do pairs of two parts seem to be [m]."""
 APART_M = 10.0
 """Parts lie this far from each other along the fourth axis of the tree [m]; above any gate."""
 MAX_HALF_WINDOW = 8
@@ -48,6 +52,7 @@ def associate(
     pixel_gate_m: float,
     pixel_pairs: int,
     vertex_labels: UInt8[ndarray, " v"],
+    part_m: float = PART_M,
 ) -> Pairs:
     """Pair skin and observation in both directions.
 
@@ -59,6 +64,8 @@ def associate(
         pixel_gate_m: Largest distance of a pair found from a pixel [m].
         pixel_pairs: About how many pixels look for a vertex; 0 for the paper's one direction.
         vertex_labels: Body part of every vertex; counts only where the observation is labelled.
+        part_m: By how much a pair of two different parts counts as longer, squares added [m]; above
+            both gates no such pair is made [Wan19, 5].
 
     Returns:
         The pairs, in a fixed order.
@@ -76,17 +83,13 @@ def associate(
         camera.cx,
         camera.cy,
         gate_m,
+        part_m,
     )
     seen, part = sample_region(observation, pixel_pairs)
     if len(seen) and len(index):
-        skin = vertices_camera[index]
-        asked = seen
-        if part is not None:
-            skin = np.column_stack([skin, APART_M * vertex_labels[index]])
-            asked = np.column_stack([seen, APART_M * part])
-        tree = cKDTree(skin, balanced_tree=False, compact_nodes=False)
-        distance, nearest = map(np.asarray, tree.query(asked, distance_upper_bound=pixel_gate_m))
-        near = np.isfinite(distance)
+        skin, skin_part = vertices_camera[index], vertex_labels[index]
+        nearest = _nearest(skin, skin_part, seen, part, pixel_gate_m, part_m)
+        near = nearest < len(index)
         seen, taken = seen[near], index[nearest[near]]
     else:
         seen, taken = seen[:0], index[:0]
@@ -98,6 +101,34 @@ def associate(
         np.concatenate([flat[pixel[found]], seen]),
         int(found.sum()),
     )
+
+
+def _nearest(
+    skin: Float[ndarray, "v 3"],
+    skin_part: UInt8[ndarray, " v"],
+    points: Float[ndarray, "n 3"],
+    part: UInt8[ndarray, " n"] | None,
+    gate_m: float,
+    part_m: float,
+) -> Int[ndarray, " n"]:
+    """Nearest vertex of each point, V where none is near enough."""
+    if part is None:
+        return _ask(skin, points, gate_m)[1]
+    own = np.column_stack([skin, APART_M * skin_part])
+    distance, nearest = _ask(own, np.column_stack([points, APART_M * part]), gate_m)
+    if part_m < gate_m:
+        across, anywhere = _ask(skin, points, math.sqrt(gate_m**2 - part_m**2))
+        nearest = np.where(np.hypot(across, part_m) < distance, anywhere, nearest)
+    return nearest
+
+
+def _ask(
+    skin: Float[ndarray, "v d"], points: Float[ndarray, "n d"], gate_m: float
+) -> tuple[Float[ndarray, " n"], Int[ndarray, " n"]]:
+    """Distance to the nearest vertex and which it is; infinite and V beyond the gate."""
+    tree = cKDTree(skin, balanced_tree=False, compact_nodes=False)
+    distance, nearest = map(np.asarray, tree.query(points, distance_upper_bound=gate_m))
+    return distance, nearest
 
 
 @cache
@@ -134,7 +165,7 @@ def _wanted(observation: Observation) -> UInt8[ndarray, "h w"]:
 
 
 @njit(cache=True, nogil=True)
-def _search(v, points, wanted, part, fx, fy, cx, cy, gate):
+def _search(v, points, wanted, part, fx, fy, cx, cy, gate, part_m):
     h, w = wanted.shape
     out = np.full(v.shape[0], -1, dtype=np.int64)
     for i in range(v.shape[0]):
@@ -149,12 +180,14 @@ def _search(v, points, wanted, part, fx, fy, cx, cy, gate):
         left = max(0, -((u - half) // step)) * step if u < half else 0
         for a in range(r - half + above, min(h, r + half + 1), step):
             for b in range(u - half + left, min(w, u + half + 1), step):
-                if wanted[a, b] != part[i]:
+                if wanted[a, b] == 0:
                     continue
                 dx = points[a, b, 0] - x
                 dy = points[a, b, 1] - y
                 dz = points[a, b, 2] - z
                 d = dx * dx + dy * dy + dz * dz
+                if wanted[a, b] != part[i]:
+                    d += part_m * part_m
                 if d < best:
                     best = d
                     out[i] = a * w + b
