@@ -19,7 +19,7 @@ def test_a_dataset_says_its_size_is_built_and_looked_at(tmp_path, capsys):
     ]
     main(build)
     said = capsys.readouterr().out
-    assert "1 recordings, 20 frames; 0 are there" in said and "GB to write" in said
+    assert "1 recordings, 10 frames; 0 are there" in said and "GB to write" in said
     main(build)
     assert "1 are there; about 0.00 GB" in capsys.readouterr().out
     main(["dataset", "pictures", str(out), "-o", str(tmp_path / "sheet.png"), "--count", "2"])

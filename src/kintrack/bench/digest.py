@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What decides a fitted pose: a digest that tells whether a kept result is still valid."""
+"""What decides a fitted pose: digests that tell whether a kept result is still valid."""
 
 from __future__ import annotations
 
 import ast
 import hashlib
+from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
 
+import segmentation
 from kintrack.body import model_folder
 
 NOT_TRACKING = (
     "bench",
+    "calibration",
     "cli",
     "commands",
     "demo",
@@ -23,16 +27,69 @@ NOT_TRACKING = (
     "viewer",
 )
 """Modules that no fitted pose depends on."""
+LABELLING = (
+    "architecture",
+    "evaluate",
+    "graph",
+    "labels",
+    "networks",
+    "preprocess",
+    "runtime",
+    "tracking",
+)
+"""Modules of `segmentation` that decide the labels a network of given weights gives."""
+REGRESSING = ("rgb", "rgb_worker")
+"""Modules beside this one that decide what comes of colour."""
 
 
 def code_digest() -> str:
     """SHA-256 over code and model that decide the poses; layout and comments do not count."""
     package = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
-        if path.relative_to(package).parts[0].removesuffix(".py") not in NOT_TRACKING:
-            digest.update(ast.dump(ast.parse(path.read_bytes())).encode())
+    paths = [
+        path
+        for path in sorted(package.rglob("*.py"))
+        if path.relative_to(package).parts[0].removesuffix(".py") not in NOT_TRACKING
+    ]
+    digest = hashlib.sha256(_trees(paths))
     model = model_folder()
     for path in [model / "human.urdf", *sorted((model / "skin").glob("*.npz"))]:
         digest.update(path.read_bytes())
     return digest.hexdigest()
+
+
+def result_digest(
+    is_rgb: bool, weights: Path | None, how: Sequence[bool], recordings: Sequence[str]
+) -> str:
+    """SHA-256 over all that decides one result of the accuracy bench.
+
+    Args:
+        is_rgb: Whether it comes from colour and no body is fitted.
+        weights: Of the network, if there is one.
+        how: Switches of the method.
+        recordings: Fingerprints of the recordings that go in.
+    """
+    code = _regressing_code() if is_rgb else _tracking_code()
+    facts = (code, _content(weights), *how, *recordings)
+    return hashlib.sha256(repr(facts).encode()).hexdigest()
+
+
+@cache
+def _tracking_code() -> str:
+    folder = Path(segmentation.__file__).parent
+    labelling = _trees(folder / f"{name}.py" for name in LABELLING)
+    return hashlib.sha256(code_digest().encode() + labelling).hexdigest()
+
+
+@cache
+def _regressing_code() -> str:
+    folder = Path(__file__).parent
+    return hashlib.sha256(_trees(folder / f"{name}.py" for name in REGRESSING)).hexdigest()
+
+
+@cache
+def _content(path: Path | None) -> str:
+    return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _trees(paths: Iterable[Path]) -> bytes:
+    return b"".join(ast.dump(ast.parse(path.read_bytes())).encode() for path in paths)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of the accuracy bench: accuracy over threshold, and every joint seen or hidden."""
+"""Curves of the accuracy bench: share of joints within a threshold, and every joint by itself."""
 
 from __future__ import annotations
 
@@ -12,99 +12,137 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from kintrack.bench.cases import ALONE, CLEAN, OBJECTS, REAL, ROOM, SCENE
+from kintrack.bench.methods import COLD, GEOMETRY, NO_TARGETS, RGB, TRUE_LABELS
 from kintrack.joints import JOINT_NAMES
 from kintrack.result import write_atomically
 
 CURVES_FILE, JOINTS_FILE = "accuracy.png", "joints.png"
-_COLORS = {"clean": "#999999", "60 cm": "#56b4e9", "45 cm": "#e69f00", "30 cm": "#d55e00"}
-_LINES = ("-", "--", ":", "-.")
-_TITLES = {
-    "alone": "synthetic, nothing around the person",
-    "room": "synthetic, in rooms",
-    "real": "real recordings, against the clean fit",
-    "kinect": "real recordings, agreement with the Kinect",
+SHOWN = (CLEAN, SCENE, *reversed(OBJECTS))
+"""Conditions that have curves."""
+TITLES = {
+    ROOM: "synthetic, in rooms",
+    ALONE: "synthetic, nothing around",
+    REAL: "real people in a real room, against the clean fit",
 }
+_NAMES = {GEOMETRY: "geometry alone", TRUE_LABELS: "true labels", RGB: "RGB regression"}
+_COLORS = {GEOMETRY: "#d55e00", TRUE_LABELS: "#000000", RGB: "#cc79a7"}
+_NETWORKS = ("#0072b2", "#009e73", "#e69f00", "#56b4e9", "#999999")
+_CONDITIONS = {CLEAN: "#999999", SCENE: "#000000", **dict(
+    zip(OBJECTS, ("#d55e00", "#e69f00", "#56b4e9"), strict=True))}  # fmt: skip
 
 
 def write_pictures(content: dict[str, Any], folder: Path) -> tuple[Path, ...]:
     """Draw `accuracy.png` and `joints.png` from the content of `accuracy.json`.
 
     Returns:
-        The files.
+        The files; none if nothing was scored.
 
     Raises:
         ResultError: if one cannot be written.
     """
-    figures = {CURVES_FILE: draw_curves(content["scores"]), JOINTS_FILE: _joints(content["scores"])}
+    scores = content["scores"]
+    if not any(group in TITLES for groups in scores.values() for group in groups):
+        return ()
+    figures = {CURVES_FILE: draw_curves(scores), JOINTS_FILE: draw_joints(scores)}
     for name, figure in figures.items():
-        write_atomically(folder / name, partial(figure.savefig, format="png", dpi=180))
+        write_atomically(folder / name, partial(figure.savefig, format="png", dpi=160))
     return tuple(folder / name for name in figures)
 
 
-def draw_curves(scores: dict[str, Any]) -> Figure:
-    """Share of joints within a threshold, a line style per method, a colour per distance.
+def in_words(method: str) -> str:
+    """What a method is called in pictures and tables."""
+    warm = method.removesuffix(COLD)
+    bare = warm.removesuffix(NO_TARGETS)
+    off = ", targets off" if bare != warm else ""
+    return _NAMES.get(bare, bare) + off + (", cold start" if warm != method else "")
 
-    Rows are all, visible and hidden joints; columns are groups of recordings.
+
+def draw_curves(scores: dict[str, Any]) -> Figure:
+    """Share of joints within a threshold: a colour per method, dashed where it starts cold.
+
+    A row per group of recordings and kind of joint, a column per condition.
     """
-    groups = [g for g in _TITLES if any(g in by_group for by_group in scores.values())]
-    figure = Figure(figsize=(3.1 * len(groups) + 0.6, 7.6), layout="constrained")
-    axes = figure.subplots(3, len(groups), squeeze=False, sharex=True, sharey=True)
-    for row, part in zip(axes, ("all", "visible", "hidden"), strict=True):
-        for axis, group in zip(row, groups, strict=True):
-            _curves(axis, scores, group, part)
+    rows = [
+        (group, part)
+        for group in TITLES
+        if any(group in groups for groups in scores.values())
+        for part in (("all", "visible", "hidden") if group == ROOM else ("all",))
+    ]
+    columns = (CLEAN, *reversed(OBJECTS))
+    figure = Figure(figsize=(2.5 * len(columns) + 0.6, 2.2 * len(rows) + 0.9), layout="constrained")
+    axes = figure.subplots(len(rows), len(columns), squeeze=False, sharex=True, sharey=True)
+    lines: dict[str, Any] = {}
+    for (group, part), row in zip(rows, axes, strict=True):
+        for condition, axis in zip(columns, row, strict=True):
+            # real people without a room are what the others are compared with
+            bare = SCENE if group == REAL and condition == CLEAN else condition
+            lines |= _curves(axis, scores, group, bare, part)
             axis.grid(alpha=0.3, lw=0.5)
             axis.spines[["top", "right"]].set_visible(False)
             axis.tick_params(labelsize=7)
-        row[0].set_ylabel(f"{part} joints within threshold [%]", fontsize=8)
-    for axis, group in zip(axes[0], groups, strict=True):
-        axis.set_title(_TITLES[group], fontsize=8)
+        kind = "" if part == "all" else f"\n{part} joints only"
+        row[0].set_ylabel(f"{TITLES[group]}{kind}\nwithin threshold [%]", fontsize=7)
+    for axis, condition in zip(axes[0], columns, strict=True):
+        title = "no object" if condition == CLEAN else f"object {condition} before"
+        axis.set_title(title, fontsize=8)
     for axis in axes[-1]:
         axis.set_xlabel("threshold [cm]", fontsize=8)
     axes[0][0].set(ylim=(0, 102), xticks=(2, 5, 10, 15, 20))
-    axes[0][-1].legend(fontsize=6.5, frameon=False, loc="lower right")
+    order = [name for name in scores if name in lines]
+    figure.legend(
+        [lines[name] for name in order], [in_words(name) for name in order],
+        loc="outside lower center", ncols=4, fontsize=7.5, frameon=False,
+    )  # fmt: skip
     return figure
 
 
-def _curves(axis: Axes, scores: dict[str, Any], group: str, part: str) -> None:
-    for (method, by_group), line in zip(scores.items(), _LINES * len(scores), strict=False):
-        for condition, found in by_group.get(group, {}).items():
-            if found[part]["accuracy"] is None:
-                continue
-            axis.plot(
-                100 * np.array(found["thresholds_m"]),
-                100 * np.array(found[part]["accuracy"]),
-                line,
-                color=_COLORS[condition],
-                lw=1.3,
-                label=f"{method}, {condition}",
-            )
+def _curves(
+    axis: Axes, scores: dict[str, Any], group: str, condition: str, part: str
+) -> dict[str, Any]:
+    lines = {}
+    networks = [name for name in scores if name.removesuffix(COLD) not in _NAMES]
+    bare = list(dict.fromkeys(name.removesuffix(COLD) for name in networks))
+    for method, groups in scores.items():
+        found = groups.get(group, {}).get(condition)
+        if found is None or found[part]["accuracy"] is None:
+            continue
+        name = method.removesuffix(COLD)
+        color = _COLORS.get(name) or _NETWORKS[bare.index(name) % len(_NETWORKS)]
+        (lines[method],) = axis.plot(
+            100 * np.array(found["thresholds_m"]),
+            100 * np.array(found[part]["accuracy"]),
+            "-" if name == method else "--",
+            color=color,
+            lw=1.9 if bare and name == bare[0] else 1.2,
+        )
+    return lines
 
 
-def _joints(scores: dict[str, Any]) -> Figure:
-    """Mean error of every joint at every distance, first method, a row per group."""
-    by_group = next(iter(scores.values()))
-    groups = [group for group in _TITLES if group in by_group]
-    figure = Figure(figsize=(7.6, 2.3 * len(groups) + 0.6), layout="constrained")
-    axes = figure.subplots(len(groups), 1, squeeze=False, sharex=True)[:, 0]
+def draw_joints(scores: dict[str, Any]) -> Figure:
+    """Mean error of every joint in every condition, a row per group: the first network's.
+
+    Without a network, the first method's.
+    """
+    own = next((name for name in scores if name not in _NAMES and COLD not in name), None)
+    method = own or next(iter(scores))
+    groups = [group for group in TITLES if group in scores[method]]
+    figure = Figure(figsize=(7.6, 2.3 * max(len(groups), 1) + 0.6), layout="constrained")
+    axes = figure.subplots(max(len(groups), 1), 1, squeeze=False, sharex=True)[:, 0]
     x = np.arange(len(JOINT_NAMES))
-    for axis, group in zip(axes, groups, strict=True):
-        conditions = by_group[group]
-        width = 0.8 / len(conditions)
-        for n, (condition, found) in enumerate(conditions.items()):
+    for axis, group in zip(axes, groups, strict=False):
+        shown = {c: found for c, found in scores[method][group].items() if c in SHOWN}
+        width = 0.8 / max(len(shown), 1)
+        for n, (condition, found) in enumerate(shown.items()):
             means = [found["joints"][name]["mean_m"] for name in JOINT_NAMES]
             heights = [np.nan if mean is None else 100 * mean for mean in means]
-            axis.bar(
-                x + (n + 0.5) * width - 0.4,
-                heights,
-                width,
-                color=_COLORS[condition],
-                label=condition,
-            )
+            place = x + (n + 0.5) * width - 0.4
+            axis.bar(place, heights, width, color=_CONDITIONS[condition], label=condition)
         axis.set_ylabel("mean error [cm]", fontsize=8)
-        axis.set_title(_TITLES[group], fontsize=8)
+        axis.set_title(f"{in_words(method)}: {TITLES[group]}", fontsize=8)
         axis.tick_params(labelsize=7)
         axis.spines[["top", "right"]].set_visible(False)
-    axes[0].legend(fontsize=7, frameon=False, ncols=4)
+        axis.legend(fontsize=7, frameon=False, ncols=5)
     words = [re.sub("^l_", "left ", re.sub("^r_", "right ", name)) for name in JOINT_NAMES]
     axes[-1].set_xticks(x, words, rotation=90)
     return figure

@@ -3,70 +3,168 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 from numpy import ndarray
 
+from kintrack.bench.cases import ALONE, CLEAN, GAPS, REAL, ROOM, SCENES, Case
+from kintrack.bench.rgb import regress
+from kintrack.config import PullConfig, TrackerConfig
+from kintrack.errors import ConfigError
 from kintrack.fit import fit_sequence
 from kintrack.geometry import camera_pose
 from kintrack.joints import JOINT_NAMES
+from kintrack.segmenter import Segmenter
 from kintrack.sequence import open_sequence
 from kintrack.sequence.frame import Frame
 from kintrack.sequence.reference import read_reference_joints
+from segmentation.runtime import RuntimeConfig, load_segmenter
+from segmentation.tracking import ImageSegmenter, TrueSegmenter
 
 BEFORE_S = 1.0 / 30.0
 """How long before the recording a tracker that starts warm is started [s]."""
+GEOMETRY, TRUE_LABELS, RGB, NETWORK = "geometry", "true_labels", "rgb", "network"
+COLD, NO_TARGETS = "_cold", "_no_targets"
+OFF = PullConfig(sigma_m=1e6)
+"""A pull of no weight."""
+HARDEST = "30 cm"
+"""Where rivals that start cold are compared."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to get joints."""
+
+    name: str
+    """What it is called in the tables."""
+    kind: str
+    """`GEOMETRY`, `TRUE_LABELS`, `RGB` or `NETWORK`."""
+    weights: Path | None = None
+    """Of the network."""
+    cold: bool = False
+    """Whether it has to start by itself; the others are told the true joints of the clean first
+    frame."""
+    main: bool = False
+    """Whether it is what this project does: the first network."""
+    targets: bool = True
+    """Whether rough places of the parts pull while tracking."""
+
+    def runs_on(self, case: Case) -> bool:
+        """Whether the bench asks it about a recording."""
+        if not self.targets:
+            gap = not self.cold and case.condition in GAPS
+            return case.group == ROOM and (gap or case.condition == HARDEST)
+        if case.group == SCENES:
+            return self.cold and self.kind != TRUE_LABELS
+        if case.group == ALONE:
+            return self.kind == GEOMETRY and not self.cold or self.main and not self.cold
+        if case.group == REAL:
+            # the geometric fit of the clean recording is what the others are compared with
+            return not self.cold and (
+                self.main and case.condition != CLEAN or self.kind == GEOMETRY
+            )
+        if case.condition in GAPS:
+            return not self.cold and (self.main or self.kind == TRUE_LABELS)
+        return not self.cold or self.main or case.condition == HARDEST
 
 
 @dataclass(frozen=True)
 class Task:
     """One recording for one method."""
 
-    sequence: Path
+    case: Case
     """The recording."""
-    clean: Path
-    """The same without the object."""
-    pitch_deg: float
-    """How far the camera looks down [deg]."""
+    clean: Case
+    """The same with nothing added."""
     result: Path
     """Result folder to write."""
+    pixels: Path
+    """Where joints found in colour images are kept."""
+    mediapipe: Path | None = None
+    """Python that has MediaPipe; this one if None."""
 
 
-Method = Callable[[Task, Callable[[], None]], None]
-"""Writes the result and calls after every frame."""
+def methods_of(weights: Mapping[str, Path], chosen: Sequence[str] = ()) -> tuple[Method, ...]:
+    """Every method, or those that are named.
 
+    Args:
+        weights: Name -> weights file, this project's own first.
+        chosen: Names; all if empty.
 
-def geometry(task: Task, on_frame: Callable[[], None]) -> None:
-    """The geometric tracker alone, started at the true joints before the object appears.
-
-    In [Wan19] every tracker has the right pose to begin with, too. The size of the person is
-    estimated from the clean first frame.
+    Raises:
+        ConfigError: if a name is unknown, or weights are called as another method is.
     """
-    names, joints = read_reference_joints(task.clean / "reference_joints.csv")
-    first = open_sequence(task.clean).frame(0)
-    known = np.full((len(JOINT_NAMES), 3), np.nan)
-    for name, place in zip(names, joints[0], strict=True):
-        known[JOINT_NAMES.index(name)] = place
-    _fit(task, on_frame, (replace(first, timestamp_s=first.timestamp_s - BEFORE_S), known))
+    own = next(iter(weights), None)
+    warm = [Method(GEOMETRY, GEOMETRY), Method(TRUE_LABELS, TRUE_LABELS)]
+    warm += [Method(name, NETWORK, path, main=name == own) for name, path in weights.items()]
+    if own is not None:
+        warm.append(Method(own + NO_TARGETS, NETWORK, weights[own], targets=False))
+    known = {
+        method.name: method
+        for one in warm
+        for method in (one, replace(one, name=one.name + COLD, cold=True))
+    }
+    known[RGB] = Method(RGB, RGB)
+    if len(known) < 2 * len(warm) + 1:
+        raise ConfigError(f"weights {', '.join(weights)}: a name is that of another method")
+    unknown = sorted(set(chosen) - set(known))
+    if unknown:
+        raise ConfigError(f"methods {', '.join(unknown)}: allowed are {', '.join(known)}")
+    return tuple(method for name, method in known.items() if not chosen or name in chosen)
 
 
-def geometry_cold(task: Task, on_frame: Callable[[], None]) -> None:
-    """The geometric tracker alone, which has to start by itself on what it sees."""
-    _fit(task, on_frame, None)
+def run_method(method: Method, task: Task, on_frame: Callable[[], None]) -> None:
+    """Write the result of a method on a recording.
 
-
-def _fit(task: Task, on_frame: Callable[[], None], begun: tuple[Frame, ndarray] | None) -> None:
+    Args:
+        method: What to run.
+        task: On what.
+        on_frame: Called after every frame.
+    """
+    sequence = open_sequence(task.case.sequence)
+    if method.kind == RGB:
+        regress(sequence, task.result, task.pixels, task.mediapipe, on_frame)
+        return
     fit_sequence(
-        open_sequence(task.sequence),
+        sequence,
         task.result,
-        T_world_camera=camera_pose(task.pitch_deg),
+        TrackerConfig() if method.targets else TrackerConfig(pull=OFF),
+        T_world_camera=camera_pose(task.case.pitch_deg),
         on_frame=lambda frame, found: on_frame(),
-        begun=begun,
+        begun=None if method.cold else _begun(task.clean),
+        segmenter=_segmenter(method),
     )
 
 
-METHODS: dict[str, Method] = {"geometry": geometry, "geometry_cold": geometry_cold}
-"""Every method by name."""
+def _begun(clean: Case) -> tuple[Frame, Float[ndarray, "j 3"]]:
+    """The first frame before anything appeared, and the joints in it.
+
+    In [Wan19] every tracker has the right pose to begin with, too. The person's size is estimated
+    from that frame.
+    """
+    names, joints = read_reference_joints(clean.sequence / "reference_joints.csv")
+    first = open_sequence(clean.sequence).frame(0)
+    known = np.full((len(JOINT_NAMES), 3), np.nan)
+    for name, place in zip(names, joints[0], strict=True):
+        known[JOINT_NAMES.index(name)] = place
+    return replace(first, timestamp_s=first.timestamp_s - BEFORE_S), known
+
+
+def _segmenter(method: Method) -> Segmenter | None:
+    if method.kind == GEOMETRY:
+        return None
+    if method.kind == TRUE_LABELS:
+        return TrueSegmenter()
+    assert method.weights is not None
+    return _network(method.weights)
+
+
+@cache
+def _network(weights: Path) -> Segmenter:
+    """One per process; one thread, since there is a process per core."""
+    return ImageSegmenter(load_segmenter(weights, RuntimeConfig(threads=1)))

@@ -3,49 +3,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
-from rich.table import Table
 
-from kintrack.bench.accuracy import RESULT_FILE, AccuracyConfig, run_accuracy
+from kintrack.bench import tables as accuracy_tables
+from kintrack.bench.accuracy import RESULT_FILE, run_accuracy
 from kintrack.bench.figure import write_pictures
 from kintrack.bench.filming import FilmingConfig, run_filming
+from kintrack.bench.panels import write_methods
+from kintrack.bench.recordings import AccuracyConfig, Sources
 from kintrack.bench.segmentation import figure as segmentation_figure
 from kintrack.bench.segmentation import run as segmentation_run
 from kintrack.bench.segmentation import tables as segmentation_tables
 from kintrack.bench.segmentation.config import SegmentationBenchConfig, named_weights
 from kintrack.bench.segmentation.inputs import Inputs
+from kintrack.bench.targets import targets_grid
 from kintrack.commands.console import StepProgress, console
+from segmentation.weights import SHIPPED
 
 
 @dataclass(frozen=True)
 class BenchAccuracy:
-    """Joint errors with objects at 30, 45 and 60 cm before the person: tables, curves, a JSON."""
+    """Joint errors of every method behind objects and after losses: tables, pictures, a JSON."""
 
+    weights: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=FILE ...")] = ()
+    """Networks to compare, this project's own first; the one that ships if none is given."""
     output: Path = Path("kintrack-bench")
     """Folder for recordings, results and scores; a stopped bench goes on there."""
     mocap: Path | None = None
     """Folder of motion capture clips; authored motions only if not given."""
-    real: Path | None = None
-    """Folder of real recordings without background, each a sequence folder."""
+    data: Path | None = None
+    """Folder with the real recordings (utd_mhad, scenes, bonn_tablet, bonn_three, sofa, uva_turn);
+    synthetic people only if not given."""
     config: Annotated[AccuracyConfig, tyro.conf.OmitArgPrefixes] = field(
         default_factory=AccuracyConfig
     )
-    """Methods, seed, lengths."""
+    """Methods, groups, seed, lengths."""
 
     def run(self) -> None:
-        """Run with progress, print the table, draw the pictures."""
+        """Run with progress, print the tables, draw the pictures."""
+        weights = named_weights(self.weights) if self.weights else {SHIPPED.stem: SHIPPED}
+        sources = Sources(self.mocap, self.data)
         with StepProgress() as progress:
-            content = run_accuracy(self.output, self.config, self.mocap, self.real, progress)
-        console.print(accuracy_table(content))
-        for key, problem in content["not_made"].items():
-            console.print(f"left out {key}: {problem}")
-        pictures = write_pictures(content, self.output)
-        console.print(f"written: {', '.join(map(str, [self.output / RESULT_FILE, *pictures]))}")
+            bench = run_accuracy(self.output, weights, self.config, sources, progress)
+        print_accuracy(bench.content)
+        pictures = [*write_pictures(bench.content, self.output), write_methods(bench)]
+        written = [self.output / RESULT_FILE, *(path for path in pictures if path)]
+        console.print(f"written: {', '.join(map(str, written))}")
 
 
 @dataclass(frozen=True)
@@ -121,57 +129,20 @@ class Bench:
         self.what.run()
 
 
-def accuracy_table(content: dict[str, Any]) -> Table:
-    """Errors by method, group and distance."""
-    table = Table(title="Joint error (cm), share of joints within 10 cm", title_justify="left")
-    for title in ("method", "set", "object"):
-        table.add_column(title, no_wrap=True)
-    for title in ("n", "hidden", "posed", "all", "seen", "unseen", "<10 cm"):
-        table.add_column(title, justify="right", no_wrap=True)
-    for method, group, condition, found in rows_of(content):
-        table.add_row(
-            method,
-            group,
-            condition,
-            str(found["recordings"]),
-            percent(found["hidden_share"]),
-            percent(found["all"]["posed"]),
-            *(centimetres(found[part]["mean_m"]) for part in ("all", "visible", "hidden")),
-            percent(within(found, 0.10)),
-        )
-    return table
+def print_accuracy(content: dict[str, Any]) -> None:
+    """Print every table of the accuracy bench that has rows, and what was left out."""
+    grids = [targets_grid(content), *accuracy_tables.all_grids(content)]
+    _print((grid for grid in grids if grid.rows), content["left_out"])
 
 
 def print_grids(content: dict[str, Any]) -> None:
     """Print every table of the segmentation bench that has rows, and what was left out."""
-    for grid in segmentation_tables.all_grids(content):
+    _print(segmentation_tables.all_grids(content), content["left_out"])
+
+
+def _print(grids: Iterable[segmentation_tables.Grid], left_out: dict[str, str]) -> None:
+    for grid in grids:
         console.print(f"\n{grid.title}", style="bold", markup=False)
         console.print(grid.text(), soft_wrap=True, highlight=False, markup=False)
-    for key, problem in content["left_out"].items():
-        console.print(f"left out {key}: {problem}")
-
-
-def rows_of(content: dict[str, Any]) -> Iterator[tuple[str, str, str, dict[str, Any]]]:
-    """Method, group, condition and scores, in the order of the table."""
-    for method, groups in content["scores"].items():
-        for group, conditions in groups.items():
-            for condition, found in conditions.items():
-                yield method, group, condition, found
-
-
-def within(found: dict[str, Any], threshold_m: float) -> float | None:
-    """Share of all joints within a threshold; None without joints."""
-    if found["all"]["accuracy"] is None:
-        return None
-    distances = [abs(t - threshold_m) for t in found["thresholds_m"]]
-    return float(found["all"]["accuracy"][distances.index(min(distances))])
-
-
-def percent(share: float | None) -> str:
-    """A share in percent, to be printed."""
-    return "-" if share is None else f"{100 * share:.1f}%"
-
-
-def centimetres(length_m: float | None) -> str:
-    """A length in centimetres, to be printed."""
-    return "-" if length_m is None else f"{100 * length_m:.1f}"
+    for key, problem in left_out.items():
+        console.print(f"left out {key}: {problem}", markup=False)

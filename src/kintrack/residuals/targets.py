@@ -17,6 +17,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from kintrack.body import BodyState, joint_jacobians
+from kintrack.residuals.joints import JointResidual
 from kintrack.residuals.linearization import Linearization, Quadratic, quadratic_of
 
 
@@ -50,6 +51,16 @@ class TargetResidual:
         J = turn @ joint_jacobians(state)[self.joint]
         weights = np.full(r.size, self.sigma_m**-2.0)
         return Linearization(r.ravel(), J.reshape(r.size, J.shape[-1]), weights)
+
+    def frozen(self, state: BodyState) -> JointResidual:
+        """The same pull as plain squares: towards the near end of the free distance.
+
+        Joints within it are left out. Value and gradient at the state are those of this term.
+        """
+        d, share = self._offsets(state)
+        far = share < 1.0
+        places = self.places_world + d * share[:, None]
+        return JointResidual(self.joint[far], places[far], self.sigma_m)
 
     def quadratic(self, state: BodyState) -> Quadratic:
         """J^T W J, J^T W r and the cost."""

@@ -29,6 +29,7 @@ from kintrack.residuals.joints import JointResidual
 from kintrack.residuals.linearization import Residual
 from kintrack.residuals.prior import TangentPrior
 from kintrack.residuals.surface import SurfaceResidual
+from kintrack.residuals.targets import TargetResidual
 from kintrack.solver.symbolic_body import joint_origins
 
 
@@ -101,12 +102,14 @@ def parameters(
             constant += _add_surface(Q, g, residual, root_m)
         elif isinstance(residual, JointResidual):
             constant += _add_joints(Q, g, residual, body, root_m)
+        elif isinstance(residual, TargetResidual):
+            constant += _add_joints(Q, g, residual.frozen(state), body, root_m)
         elif isinstance(residual, TangentPrior):
             priors.append(residual)
         else:
             raise ConfigError(
                 f"term {type(residual).__name__}: the IPOPT solver takes SurfaceResidual, "
-                "JointResidual and TangentPrior"
+                "JointResidual, TargetResidual and TangentPrior"
             )
     places, prior_Q, prior_g, prior_constant = _sum_priors(priors, body, root_m)
     q = state.q.copy()
