@@ -61,8 +61,9 @@ HEAVY = {
     "segmentation/train.py": {"torch"},
     "segmentation/runtime.py": {"torch", "openvino"},
     "segmentation/graph.py": {"openvino"},
-    "kintrack/solver/symbolic_body.py": {"casadi"},
+    "kintrack/solver/symbolic_body.py": {"casadi", "mediapipe"},
     "kintrack/solver/nlp.py": {"casadi"},
+    "kintrack/bench/rgb_worker.py": {"mediapipe"},
 }
 """Who may import which of the packages that not everybody has."""
 ALL_HEAVY = {"torch", "anny", "pymeshlab", "trimesh", "embreex", "skimage", "PIL", "openvino",

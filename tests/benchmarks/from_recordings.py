@@ -32,10 +32,11 @@ from kintrack.sequence.frame import Frame
 from kintrack.sequence.reference import read_reference_joints
 from segmentation.augment.bank import BankConfig
 from segmentation.preprocess import letterbox
-from segmentation.recordings import SHIPPED, TuningConfig
+from segmentation.recordings import TuningConfig
 from segmentation.runtime import load_segmenter
 from segmentation.training_config import TrainConfig
 from segmentation.tuning_report import JSON_FILE, PICTURE_FILE, SCORED
+from segmentation.weights import SHIPPED
 
 TRAIN, HELD_OUT = (1, 2, 3), (4, 5)
 """Numbers of the people."""

@@ -22,7 +22,6 @@ from kintrack.errors import ConfigError, DatasetError, ResultError  # noqa: E402
 from kintrack.labelling import several  # noqa: E402
 from kintrack.labelling.sequence import Report  # noqa: E402
 from kintrack.sequence.write import SequenceWriter  # noqa: E402
-from segmentation import recordings as module  # noqa: E402
 from segmentation import train as train_module  # noqa: E402
 from segmentation import tuning_report  # noqa: E402
 from segmentation.architecture import NetworkConfig  # noqa: E402
@@ -210,7 +209,7 @@ def test_start_weights_are_checked_before_any_work(mine, tmp_path, start, labell
     config = replace(QUICK, network=NetworkConfig("unet"))
     with pytest.raises(WeightsError, match="fast_fcn.* cannot begin .*unet"):
         command(mine, tmp_path / "run", start, config).run()
-    monkeypatch.setattr(module, "SHIPPED", tmp_path / "none")
+    monkeypatch.setattr("segmentation.weights.SHIPPED", tmp_path / "none")
     with pytest.raises(ConfigError, match="no weights to begin with.*--start"):
         command(mine, tmp_path / "run", None).run()
     monkeypatch.setenv("WORLD_SIZE", "2")

@@ -17,7 +17,7 @@ from kintrack.errors import DatasetError  # noqa: E402
 from segmentation.architecture import NetworkConfig  # noqa: E402
 from segmentation.augment.bank import BankConfig  # noqa: E402
 from segmentation.augment.sample import AugmentConfig, Bank  # noqa: E402
-from segmentation.dataset import Batches, Split, everything, split  # noqa: E402
+from segmentation.dataset import Batches, Shuffled, Split, everything, split  # noqa: E402
 from segmentation.errors import SegmentationError, WeightsError  # noqa: E402
 from segmentation.labels import LABELS  # noqa: E402
 from segmentation.learner import Learner, check_finite, join_group  # noqa: E402
@@ -164,14 +164,17 @@ def test_a_worker_changes_no_batch(data):
 def test_every_picture_comes_once_an_epoch_whatever_the_number_of_processes(data):
     single = Batches(data.train, None, BANK, 4, 0)
     pair = [Batches(data.train, None, BANK, 2, 0, rank, 2) for rank in (0, 1)]
-    assert sorted(single._at(n) for n in range(len(data.train))) == [*range(len(data.train))]
+    order, count = Shuffled(len(data.train), 0), len(data.train)
+    epochs = [[order.at(count * epoch + n) for n in range(count)] for epoch in (0, 1)]
+    assert sorted(epochs[0]) == sorted(epochs[1]) == [*range(count)] and epochs[0] != epochs[1]
     joined = np.concatenate([batches[1][0] for batches in pair])
     assert (joined == single[1][0]).all()
 
 
 def test_a_small_network_learns_four_pictures_by_heart(data):
     pictures = everything(data.train.packs).spread(4)
-    config = replace(TINY, network=NetworkConfig("fast_fcn", (8, 8, 8, 12)), steps=150, rate=0.01)
+    network = NetworkConfig("fast_fcn", (8, 8, 8, 12))
+    config = replace(TINY, network=network, steps=150, rate=0.01, normalised=False)
     learner = Learner(config, join_group(config))
     images, labels = Batches(pictures, None, Bank(), 4, 0)[0]
     losses = []
