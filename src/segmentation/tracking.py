@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import UInt8
@@ -13,7 +14,24 @@ from kintrack.sequence.frame import Frame
 from segmentation.evaluate import true_labels
 from segmentation.labels import BACKGROUND, IGNORED
 from segmentation.preprocess import letterbox
-from segmentation.runtime import Segmenter
+from segmentation.runtime import RuntimeConfig, Segmenter, load_segmenter
+from segmentation.weights import SHIPPED
+
+
+def image_segmenter(
+    weights: Path | None = None, config: RuntimeConfig | None = None
+) -> ImageSegmenter:
+    """The part segmentation as the tracker takes it.
+
+    Args:
+        weights: Weights file; the one that ships if None.
+        config: What to run it on; None chooses.
+
+    Raises:
+        WeightsError: if the file cannot be used.
+        SegmentationError: if no runtime is installed.
+    """
+    return ImageSegmenter(load_segmenter(weights or SHIPPED, config))
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import zlib
 from collections.abc import Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass
@@ -16,11 +17,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from kintrack import __version__
 from kintrack.bench.digest import code_digest
+from kintrack.commands.segmenting import Segmentation
 from kintrack.config import TrackerConfig
 from kintrack.fit import fit_sequence
 from kintrack.geometry import camera_pose
 from kintrack.result import SUMMARY_FILE
 from kintrack.sequence import open_sequence
+from segmentation.weights import SHIPPED
 
 CODE_FILE = "code.sha256"
 """Digest of the tracker's code that made a result, written beside it once it is finished."""
@@ -36,6 +39,8 @@ class Job:
     """Result folder."""
     pitch_deg: float = 0.0
     """How far its camera looks down [deg]."""
+    labels: str = "network"
+    """What labels the pixels, as of `kintrack fit`."""
 
     def finished(self, digest: str) -> bool:
         """Whether the result is whole and was made by this code, version and configuration."""
@@ -47,10 +52,15 @@ class Job:
         return (
             bool(summary.get("finished"))
             and summary.get("versions", {}).get("kintrack") == __version__
-            and summary.get("config") == json.loads(json.dumps(asdict(TrackerConfig())))
+            and _plain(summary.get("config", {})) == json.loads(json.dumps(asdict(TrackerConfig())))
             and summary.get("T_world_camera") == camera_pose(self.pitch_deg).tolist()
-            and code == digest
+            and code == f"{digest} {self.labels}"
         )
+
+
+def _plain(config: dict[str, object]) -> dict[str, object]:
+    """The tracker's configuration without what belongs to labels."""
+    return {name: part for name, part in config.items() if name not in ("labelled", "segmenter")}
 
 
 def fit_all(jobs: Sequence[Job], processes: int, fresh: bool = False) -> dict[Path, str]:
@@ -66,7 +76,7 @@ def fit_all(jobs: Sequence[Job], processes: int, fresh: bool = False) -> dict[Pa
     Returns:
         Recording -> why its fit broke off, for those that did.
     """
-    digest = code_digest()
+    digest = f"{code_digest()} {zlib.crc32(SHIPPED.read_bytes()):08x}"
     todo = [job for job in jobs if fresh or not job.finished(digest)]
     if len(todo) < len(jobs):
         print(f"{len(jobs) - len(todo)} of {len(jobs)} recordings are fitted already")
@@ -115,10 +125,10 @@ def _fit(job: Job, digest: str) -> None:
     for left_over in (code, *job.result.glob(".*.part")):
         left_over.unlink(missing_ok=True)
     T_world_camera = camera_pose(job.pitch_deg)
-    fit_sequence(
-        open_sequence(job.sequence), job.result, T_world_camera=T_world_camera, on_frame=count
-    )
-    code.write_text(digest + "\n")
+    segmenter = Segmentation(job.labels).segmenter()
+    sequence = open_sequence(job.sequence)
+    fit_sequence(sequence, job.result, None, None, None, T_world_camera, count, None, segmenter)
+    code.write_text(f"{digest} {job.labels}\n")
 
 
 def _watch(futures: list[Future[None]], frames_done: Synchronized[int], total: int) -> None:

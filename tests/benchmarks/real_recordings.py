@@ -39,7 +39,8 @@ def main() -> int:
     scenes = [] if arguments.quick else [arguments.data / name for name in SCENES]
     folder = OUT / GROUP
     jobs = [
-        Job(path, folder / path.name, SCENES.get(path.name, 0.0)) for path in [*recordings, *scenes]
+        Job(path, folder / path.name, SCENES.get(path.name, 0.0), arguments.labels)
+        for path in [*recordings, *scenes]
     ]
     errors = fit_all(jobs, arguments.jobs, arguments.fresh)
     for path, error in errors.items():
@@ -56,6 +57,7 @@ def main() -> int:
 def _arguments() -> argparse.Namespace:
     made = parser(__doc__)
     made.add_argument("--jobs", type=int, default=2, help="recordings fitted at once")
+    made.add_argument("--labels", choices=["network", "none"], default="network")
     made.add_argument("--fresh", action="store_true", help="fit again what is finished")
     arguments = made.parse_args()
     if arguments.jobs < 1:

@@ -31,10 +31,9 @@ class Segmentation:
         """
         if self.labels == "none":
             return None
-        from segmentation.runtime import RuntimeConfig, load_segmenter
-        from segmentation.tracking import ImageSegmenter, TrueSegmenter
-        from segmentation.weights import SHIPPED
+        from segmentation.runtime import RuntimeConfig
+        from segmentation.tracking import TrueSegmenter, image_segmenter
 
         if self.labels == "recording":
             return TrueSegmenter()
-        return ImageSegmenter(load_segmenter(self.weights or SHIPPED, RuntimeConfig(self.runtime)))
+        return image_segmenter(self.weights, RuntimeConfig(self.runtime))
