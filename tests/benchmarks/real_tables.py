@@ -120,7 +120,8 @@ def section(scores: Sequence[RecordingScore], scenes: Sequence[SceneScore], cond
     contradicted = sum(int((s.away & ~s.reference_away).sum()) for s in scores)
     parts = [
         "## Real people: UTD-MHAD",
-        "Geometric tracker, default configuration, one body sized at each start. The reference is "
+        "Default configuration, pixels labelled by the network that ships, one body sized at each "
+        "start. The reference is "
         "the Kinect SDK's skeleton, itself 2 to 10 cm off: distances are agreement, not error. "
         "Every frame with a pose is compared, whatever its status. Joints: "
         + ", ".join(JOINT_KINDS)
