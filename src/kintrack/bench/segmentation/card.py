@@ -101,6 +101,11 @@ def _training(training: Mapping[str, Any]) -> dict[str, str]:
         "torch": "torch",
     }
     found = {word: _text(training[key]) for key, word in words.items() if training.get(key)}
+    if isinstance(first := training.get("start"), Mapping):
+        told = {word: first.get(word) for word in ("data", "steps", "device")}
+        found["begun from"] = f"`{re.sub(_PLACES, '', str(first.get('command')))}`, " + ", ".join(
+            f"{word} {_text(value)}" for word, value in told.items() if value
+        )
     if "command" in found:
         found["command"] = f"`{re.sub(_PLACES, '', found['command'])}`"
     config = training.get("config")
