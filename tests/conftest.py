@@ -133,7 +133,7 @@ def differences(body):
 def pytest_collection_modifyitems(items):
     """The bench of the networks comes last.
 
-    After every runtime has computed in one process, a Ctrl-C that a later test sends to that process
-    ends it with a segmentation fault in native code; whole commands survive theirs.
+    After every runtime has computed in one process, a Ctrl-C that a later test sends to it ends it
+    with a segmentation fault in native code; whole commands survive theirs.
     """
     items.sort(key=lambda item: item.path.name == "test_segmentation_command.py")
