@@ -128,12 +128,3 @@ def differences(body):
         return np.stack([(at(v) - at(-v)) / (2 * STEP) for v in steps], axis=-1)
 
     return derive
-
-
-def pytest_collection_modifyitems(items):
-    """The bench of the networks comes last.
-
-    After every runtime has computed in one process, a Ctrl-C that a later test sends to it ends it
-    with a segmentation fault in native code; whole commands survive theirs.
-    """
-    items.sort(key=lambda item: item.path.name == "test_segmentation_command.py")
