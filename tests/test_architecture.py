@@ -27,7 +27,7 @@ ROWS = (
     ("alignment",),
     ("occlusion", "judge"),
     ("start",),
-    ("begin", "flips"),
+    ("begin",),
     ("result",),
     ("calibration",),
     ("person",),

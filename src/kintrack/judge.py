@@ -6,7 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
+from numba import njit
 from numpy import ndarray
 from scipy.spatial import cKDTree
 
@@ -15,9 +16,12 @@ from kintrack.association.hiding import hidden_vertices
 from kintrack.association.observation import Observation
 from kintrack.association.window import associate, sample_region
 from kintrack.config import JudgeConfig, OcclusionConfig
+from kintrack.geometry import LABELS
 
 NEARER_M = OcclusionConfig().nearer_m
 """What is this much nearer than the skin hides it [m]."""
+NEAR_M = 0.12
+"""Skin lies on a pixel whose depth differs less than this [m]."""
 SAMPLES = 600
 """About how many observed points are asked whether the skin explains them."""
 
@@ -121,3 +125,50 @@ def joint_visibility(
     nearest = np.sqrt(np.maximum(np.where(facing, d2, np.inf).min(axis=1), 0.0))
     near = (d2 < np.maximum(radius_m, nearest + shell_m)[:, None] ** 2) & facing
     return (near & supported).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
+
+
+def label_counts(view: View, observation: Observation) -> Int[ndarray, "7 7"]:
+    """How many visible vertices of label i lie on pixels of label j.
+
+    Args:
+        view: The skin seen by the camera.
+        observation: Labelled points, sides as the network gave them.
+
+    Returns:
+        `counts[model, pixel]`; vertices with nothing near them are not counted.
+    """
+    if observation.labels is None:
+        return np.zeros((len(LABELS), len(LABELS)), dtype=np.int64)
+    camera = observation.camera
+    return _count(
+        view.vertices_camera[view.visible],
+        view.labels[view.visible],
+        observation.points_camera[..., 2],
+        observation.labels,
+        camera.fx,
+        camera.fy,
+        camera.cx,
+        camera.cy,
+        len(LABELS),
+    )
+
+
+def label_agreement(counts: Int[ndarray, "7 7"]) -> float:
+    """Share of skin on any person's pixels that lies on pixels of its own part; NaN for none."""
+    on_person = counts[1:, 1:]
+    total = int(on_person.sum())
+    return float(np.trace(on_person) / total) if total else float("nan")
+
+
+@njit(cache=True)
+def _count(skin, part, z, labels, fx, fy, cx, cy, kinds):
+    out = np.zeros((kinds, kinds), dtype=np.int64)
+    h, w = z.shape
+    for i in range(skin.shape[0]):
+        u = int(np.floor(fx * skin[i, 0] / skin[i, 2] + cx + 0.5))
+        r = int(np.floor(fy * skin[i, 1] / skin[i, 2] + cy + 0.5))
+        if u < 0 or r < 0 or u >= w or r >= h or labels[r, u] >= kinds:
+            continue
+        if z[r, u] > 0.0 and abs(z[r, u] - skin[i, 2]) < NEAR_M:
+            out[part[i], labels[r, u]] += 1
+    return out

@@ -11,7 +11,6 @@ from numpy import ndarray
 
 from kintrack.association.observation import Observation
 from kintrack.config import JudgeConfig, PullConfig
-from kintrack.flips import FlipConfig
 from kintrack.geometry import transform_points
 from kintrack.lifecycle import LifecycleConfig, Limits
 from kintrack.people import find_people, only
@@ -31,8 +30,6 @@ class LabelledConfig:
     """Starts and who is a person."""
     whereabouts: WhereaboutsConfig = field(default_factory=WhereaboutsConfig)
     """Who is who."""
-    flip: FlipConfig = field(default_factory=FlipConfig)
-    """Left taken for right."""
 
 
 def geometric_lifecycle(judge: JudgeConfig) -> LifecycleConfig:

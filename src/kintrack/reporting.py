@@ -14,10 +14,9 @@ from kintrack.association.observation import Observation
 from kintrack.body import Body, BodyState, joint_jacobians
 from kintrack.confidence import joint_covariances
 from kintrack.config import ConfidenceConfig
-from kintrack.flips import label_agreement, label_counts
 from kintrack.geometry import transform_points
 from kintrack.joints import JOINT_NAMES
-from kintrack.judge import Agreement, joint_visibility
+from kintrack.judge import Agreement, joint_visibility, label_agreement, label_counts
 from kintrack.lifecycle import Reading
 from kintrack.result import FrameResult
 from kintrack.sequence.frame import Frame

@@ -23,10 +23,10 @@ from threadpoolctl import threadpool_limits
 from kintrack.alignment import view_skin
 from kintrack.association.observation import observe
 from kintrack.config import TrackerConfig
-from kintrack.flips import label_agreement, label_counts
 from kintrack.geometry import invert_rigid, transform_points
 from kintrack.human import Human, load_human
 from kintrack.joints import JOINT_NAMES
+from kintrack.judge import label_agreement, label_counts
 from kintrack.lifecycle import Life, LifecycleConfig, Reading, absent, judged
 from kintrack.result import write_json
 from kintrack.segmenter import Segmenter
