@@ -145,13 +145,12 @@ def section(scores: Sequence[RecordingScore], scenes: Sequence[SceneScore], cond
         _failures(scores),
     ]
     if scenes:
-        parts += ["## Full scenes: read, not claimed", _SCENES_SAY, _scenes(scenes)]
+        parts += ["## Full scenes, from a cold start", _SCENES_SAY, _scenes(scenes)]
     return "\n\n".join([*parts, "### Conditions", conditions])
 
 
 _SCENES_SAY = (
-    "Furniture and other people are out of scope for the geometric tracker; these recordings only "
-    "show that reading and fitting run to the end. PCK@0.2: share of MediaPipe's joints with "
+    "A status says what the tracker thinks of itself. PCK@0.2: share of MediaPipe's joints with "
     "visibility above 0.8 that have ours within 0.2 of the torso's length (mid-shoulder to "
     "mid-hip) in the image; where there is no pose, the joint is missed."
 )
