@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 import numpy as np
 
-from kintrack.association.labelling import labels_of_pixels
+from kintrack.association.labelling import labels_of_pixels, spread_labels
+from kintrack.association.observation import observe
 
 
 def test_a_pixel_takes_the_label_of_the_cell_that_holds_its_centre():
@@ -20,3 +21,29 @@ def test_a_pixel_without_reading_is_background():
     depth[1, 2] = 0.0
     found = labels_of_pixels(np.full((4, 4), 3, dtype=np.uint8), depth)
     assert found[1, 2] == 0 and (found == 3).sum() == 15
+
+
+def test_what_is_left_takes_the_label_of_what_is_nearest_and_holes_take_none():
+    depth = np.full((5, 9), 2.0)
+    depth[0] = 0.0
+    part = np.zeros((5, 9), dtype=np.uint8)
+    part[2, 0], part[2, 8] = 3, 6
+    found = spread_labels(part, depth)
+    assert (found[0] == 0).all()
+    assert (found[1:, :4] == 3).all() and (found[1:, 5:] == 6).all()
+    assert set(found[1:, 4]) <= {3, 6}
+
+
+def test_where_nothing_is_labelled_nothing_is_spread():
+    assert not spread_labels(np.zeros((4, 6), dtype=np.uint8), np.ones((4, 6))).any()
+
+
+def test_only_in_an_image_of_a_person_alone_is_everything_the_person(scene):
+    depth = scene.depth(scene.place())
+    labels = np.zeros(depth.shape, dtype=np.uint8)
+    labels[np.unravel_index(np.argmax(depth > 0), depth.shape)] = 2
+    bare = observe(scene.frame(depth), 320, labels=labels)
+    assert bare.labels[bare.points_camera[..., 2] > 0].all()
+    walled = observe(scene.frame(np.where(depth > 0, depth, 4.0).astype(np.float32)), 320,
+                     labels=labels)  # fmt: skip
+    assert (walled.labels > 0).sum() <= 4

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
@@ -24,3 +25,28 @@ def labels_of_pixels(
     rows = (2 * np.arange(h) + 1) * labels.shape[0] // (2 * h)
     columns = (2 * np.arange(w) + 1) * labels.shape[1] // (2 * w)
     return np.where(depth_m > 0, labels[rows].take(columns, axis=1), np.uint8(0))
+
+
+def spread_labels(
+    part: UInt8[ndarray, "h w"], depth_m: Float[ndarray, "h w"]
+) -> UInt8[ndarray, "h w"]:
+    """Every reading labelled, the unlabelled ones as the nearest labelled pixel.
+
+    For images in which there is nothing but a person, so that what a network overlooks of her is
+    not taken for background.
+
+    Args:
+        part: Label of every pixel, shape (H, W), 0 = none.
+        depth_m: Depth of every pixel [m], 0 = no reading, shape (H, W).
+
+    Returns:
+        Labels, shape (H, W); 0 where there is no reading, or where nothing is labelled at all.
+    """
+    if not part.any():
+        return part
+    _, nearest = cv2.distanceTransformWithLabels(
+        (part == 0).astype(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    of_index = np.zeros(int(nearest.max()) + 1, dtype=np.uint8)
+    of_index[nearest[part > 0]] = part[part > 0]
+    return np.where(depth_m > 0, of_index[nearest], np.uint8(0))

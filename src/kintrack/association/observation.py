@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, UInt8
 from numba import njit
 from numpy import ndarray
 
-from kintrack.association.labelling import labels_of_pixels
+from kintrack.association.labelling import labels_of_pixels, spread_labels
 from kintrack.geometry import PinholeCamera
 from kintrack.sequence.frame import Frame
 
@@ -47,7 +47,8 @@ def observe(
 
     Returns:
         The observation; its region is every pixel with a reading, or, where there are labels,
-        every one that a label calls a part of the person.
+        every one that a label calls a part of the person. If there is nothing behind her, what is
+        left takes the label of what is nearest to it.
     """
     assert frame.depth_m is not None
     factor = -(-frame.camera.width // max_width_px)
@@ -58,6 +59,8 @@ def observe(
     if labels is None:
         return Observation(camera, points, read, has_background)
     part = labels_of_pixels(labels, points[..., 2])
+    if not has_background:
+        part = spread_labels(part, points[..., 2])
     return Observation(camera, points, part > 0, has_background, part)
 
 
