@@ -27,7 +27,7 @@ class Fixed:
     def __init__(self, maps):
         self.maps = maps
 
-    def segment(self, frame):
+    def segment(self, frame, region=None):
         return self.maps[frame.index]
 
 
@@ -35,7 +35,7 @@ class Constant:
     def __init__(self, label):
         self.label = label
 
-    def segment(self, frame):
+    def segment(self, frame, region=None):
         return np.full(frame.depth_m.shape, self.label, dtype=np.uint8)
 
 

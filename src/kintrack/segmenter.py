@@ -3,18 +3,27 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from kintrack.errors import SegmenterError
-from kintrack.geometry import LABELS
+from kintrack.geometry import LABELS, PinholeCamera
 from kintrack.sequence.frame import Frame
 
 LEAST_SIDE = 16
 """A label map has at least so many rows and columns."""
+
+
+class Region(NamedTuple):
+    """Where a person is in an image."""
+
+    center_px: tuple[float, float]
+    """Middle of what may be seen of her (u, v) [px]."""
+    depth_m: float
+    """How far she is [m]."""
 
 
 class Segmenter(Protocol):
@@ -25,17 +34,45 @@ class Segmenter(Protocol):
         """What it is, for the result's summary."""
         ...
 
-    def segment(self, frame: Frame) -> UInt8[ndarray, "r c"]:
-        """Label map that covers the whole image, in any size with the image's aspect."""
+    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
+        """Label map that covers the whole image, in any size with the image's aspect.
+
+        With a region, nobody will ask about people elsewhere.
+        """
         ...
 
 
-def checked_labels(segmenter: Segmenter, frame: Frame) -> UInt8[ndarray, "r c"]:
+def region_of(points_camera: Float[ndarray, "n 3"], camera: PinholeCamera) -> Region | None:
+    """Where somebody is whose joints are known.
+
+    Args:
+        points_camera: Joint centres [m], camera frame.
+        camera: The camera.
+
+    Returns:
+        The region; None if not all of her is before the camera.
+    """
+    z = points_camera[:, 2]
+    if not (z > 0).all():
+        return None
+    pixels = points_camera[:, :2] / z[:, None] * (camera.fx, camera.fy) + (camera.cx, camera.cy)
+    inside = (pixels >= 0) & (pixels < (camera.width, camera.height))
+    seen = inside.all(axis=1)
+    if not seen.any():
+        return None
+    u, v = 0.5 * (pixels[seen].min(axis=0) + pixels[seen].max(axis=0))
+    return Region((float(u), float(v)), float(np.median(z[seen])))
+
+
+def checked_labels(
+    segmenter: Segmenter, frame: Frame, region: Region | None = None
+) -> UInt8[ndarray, "r c"]:
     """What a segmenter says of a frame, once it is known to be a label map of it.
 
     Args:
         segmenter: Any segmenter.
         frame: A good frame.
+        region: Where the person is; None if that is not known.
 
     Returns:
         Labels 0 to 6, shape (R, C), spread over the whole image.
@@ -43,7 +80,7 @@ def checked_labels(segmenter: Segmenter, frame: Frame) -> UInt8[ndarray, "r c"]:
     Raises:
         SegmenterError: if type, size or a value is wrong.
     """
-    labels = segmenter.segment(frame)
+    labels = segmenter.segment(frame, region)
     who = f"{type(segmenter).__name__} returned for frame {frame.index}"
     if not isinstance(labels, ndarray) or labels.ndim != 2 or labels.dtype != np.uint8:
         kind = (

@@ -16,7 +16,7 @@ from numpy import ndarray
 
 from kintrack.errors import DatasetError
 from segmentation.augment.sample import AugmentConfig, Bank, augmented, plain_sample
-from segmentation.pack import Packed, Planes, open_pack, picture
+from segmentation.pack_files import Packed, Planes, open_pack, picture
 from segmentation.picture import Picture
 
 

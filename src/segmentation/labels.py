@@ -2,6 +2,8 @@
 """The label set and the size of the network's picture; both are written into every weights file."""
 
 import numpy as np
+from jaxtyping import Bool, UInt8
+from numpy import ndarray
 
 from kintrack.geometry import LABELS
 
@@ -27,4 +29,10 @@ __all__ = [
     "INPUT_WIDTH",
     "LABELS",
     "MIRRORED",
+    "person_of",
 ]
+
+
+def person_of(labels: UInt8[ndarray, "*n"]) -> Bool[ndarray, "*n"]:
+    """True where a pixel is the person's."""
+    return np.asarray((labels != BACKGROUND) & (labels != IGNORED))

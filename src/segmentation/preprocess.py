@@ -100,7 +100,10 @@ def frame_input(frame: Frame) -> Float[ndarray, "4 106 128"]:
 
 
 def network_input(
-    depth_m: Float[ndarray, "h w"], focal_px: float, color: UInt8[ndarray, "h w 3"] | None = None
+    depth_m: Float[ndarray, "h w"],
+    focal_px: float,
+    color: UInt8[ndarray, "h w 3"] | None = None,
+    fit: Letterbox | None = None,
 ) -> Float[ndarray, "4 106 128"]:
     """The network's input for one depth image, with or without colour.
 
@@ -111,6 +114,7 @@ def network_input(
         depth_m: Depth along z [m], 0 = no reading, shape (H, W).
         focal_px: Focal length along u in pixels of that image [px].
         color: R G B registered to depth, shape (H, W, 3).
+        fit: Where the image lies in the picture; None fills as much of it as the image can.
 
     Returns:
         Planes R, G, B, D as float32, shape (4, 106, 128).
@@ -121,7 +125,10 @@ def network_input(
     depth = _checked_depth(depth_m)
     if not (math.isfinite(focal_px) and focal_px > 0):
         raise InputError(f"focal length = {focal_px!r} px: above 0 is needed")
-    fit = letterbox(depth.shape[1], depth.shape[0])
+    fit = letterbox(depth.shape[1], depth.shape[0]) if fit is None else fit
+    if (fit.height, fit.width) != depth.shape:
+        raise InputError(f"depth of shape {depth.shape} for a letterbox of {fit.width} x "
+                         f"{fit.height} px: they must be the same size")  # fmt: skip
     out = np.zeros((len(INPUT_CHANNELS), INPUT_HEIGHT, INPUT_WIDTH), dtype=np.float32)
     unit = REFERENCE_DEPTH_M * focal_px * fit.scale / REFERENCE_FOCAL_PX
     _fill_depth(depth, fit, unit, out[3])

@@ -7,9 +7,10 @@ import ctypes
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -190,11 +191,9 @@ def _openvino_int8(weights: Weights, config: RuntimeConfig) -> Infer:
 
 
 def _openvino(weights: Weights, config: RuntimeConfig, quantised: bool) -> Infer:
-    import openvino as ov
-
     from segmentation.graph import openvino_model
 
-    core = ov.Core()
+    core = _core()
     has_bf16 = "BF16" in core.get_property("CPU", "OPTIMIZATION_CAPABILITIES")
     small = not quantised and _takes_bf16(config, has_bf16)
     properties = {
@@ -211,6 +210,19 @@ def _openvino(weights: Weights, config: RuntimeConfig, quantised: bool) -> Infer
         return request.get_output_tensor(0).data[0].copy()
 
     return infer
+
+
+@cache
+def _core() -> Any:
+    """OpenVINO, once per process.
+
+    Each `Core` puts a signal stack of its own in place of the one before it and puts that back
+    when it goes; of two that do not go in reverse order the last puts back one that is unmapped,
+    and the next signal ends the process.
+    """
+    import openvino as ov
+
+    return ov.Core()
 
 
 def _torch_cpu(weights: Weights, config: RuntimeConfig) -> Infer:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Segmenters as the tracker wants them: labels that cover the image, without the picture's bars."""
+"""Segmenters as the tracker wants them: labels that cover the image, sharpest at the person."""
 
 from __future__ import annotations
 
@@ -10,12 +10,18 @@ import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
 
+from kintrack.segmenter import Region
 from kintrack.sequence.frame import Frame
+from segmentation.errors import InputError
 from segmentation.evaluate import true_labels
 from segmentation.labels import BACKGROUND, IGNORED
-from segmentation.preprocess import letterbox
-from segmentation.runtime import RuntimeConfig, Segmenter, load_segmenter
+from segmentation.preprocess import Letterbox, letterbox, network_input
+from segmentation.region import Window, region_of_person, window
+from segmentation.runtime import NetworkSegmenter, RuntimeConfig, labels_of, load_segmenter
 from segmentation.weights import SHIPPED
+
+WIDTH_PX = 320
+"""Labels of an image come thinned to at most so many columns."""
 
 
 def image_segmenter(
@@ -36,23 +42,64 @@ def image_segmenter(
 
 @dataclass(frozen=True)
 class ImageSegmenter:
-    """A network whose labels cover the image (`kintrack.segmenter.Segmenter`)."""
+    """A network that looks at the whole image first and then closer at the person."""
 
-    network: Segmenter
+    network: NetworkSegmenter
     """Labels the network's picture."""
+    closer: bool = True
+    """Whether the second look is taken; for comparison."""
 
     @property
     def name(self) -> str:
         """How the labels are computed."""
         return f"network, {self.network.runtime}"
 
-    def segment(self, frame: Frame) -> UInt8[ndarray, "r c"]:
-        """The labels of the cells that lie in the image.
+    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
+        """Labels of the image.
+
+        Args:
+            frame: A good frame.
+            region: Where the person is, if that is known: then the first look is saved, and what
+                lies outside of the region's window is background.
+
+        Returns:
+            Labels 0 to 6 of every n-th pixel, so that at most `WIDTH_PX` columns are left.
 
         Raises:
             InputError: if the frame has no depth or a broken one.
         """
-        return inside_bars(self.network.segment(frame), frame)
+        width, height, focal = frame.camera.width, frame.camera.height, frame.camera.fx
+        view = None if region is None else window(region, width, height, focal)
+        step = -(-width // WIDTH_PX)
+        out = np.zeros((-(-height // step), -(-width // step)), dtype=np.uint8)
+        if view is None:
+            whole = Window(slice(0, height), slice(0, width), letterbox(width, height))
+            self._look(frame, whole, step, out)
+            if not self.closer:
+                return out
+            assert frame.depth_m is not None
+            found = region_of_person(out, frame.depth_m, focal)
+            view = None if found is None else window(found, width, height, focal)
+            if view is None:
+                return out
+        self._look(frame, view, step, out)
+        return out
+
+    def _look(self, frame: Frame, view: Window, step: int, out: UInt8[ndarray, "r c"]) -> None:
+        """Label what a window shows."""
+        if frame.depth_m is None:
+            raise InputError(f"frame {frame.index} has no depth: {frame.problem}")
+        part = np.s_[view.rows, view.columns]
+        color = None if frame.color is None else frame.color[part]
+        try:
+            image = network_input(frame.depth_m[part], frame.camera.fx, color, view.fit)
+        except InputError as error:
+            raise InputError(f"frame {frame.index}: {error}") from None
+        cells = labels_of(self.network.logits_of(image))
+        rows, first_row = _cells(view.rows, step, view.fit.rows, view.fit.top)
+        columns, first_column = _cells(view.columns, step, view.fit.columns, view.fit.left)
+        seen = cells[rows].take(columns, axis=1)
+        out[first_row : first_row + len(rows), first_column : first_column + len(columns)] = seen
 
 
 @dataclass(frozen=True)
@@ -65,16 +112,22 @@ class TrueSegmenter:
     name = "labels of the recording"
     """As it stands in a result's summary."""
 
-    def segment(self, frame: Frame) -> UInt8[ndarray, "r c"]:
-        """True labels of the cells that lie in the image."""
+    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
+        """True labels of the cells that lie in the image, wherever a region is."""
+        fit = letterbox(frame.camera.width, frame.camera.height)
         if frame.labels is None:
-            fit = letterbox(frame.camera.width, frame.camera.height)
             return np.zeros((fit.rows, fit.columns), dtype=np.uint8)
-        labels = inside_bars(true_labels(frame), frame)
+        labels = inside_bars(true_labels(frame), fit)
         return np.where(labels == IGNORED, np.uint8(BACKGROUND), labels)
 
 
-def inside_bars(labels: UInt8[ndarray, "106 128"], frame: Frame) -> UInt8[ndarray, "r c"]:
-    """The part of the network's picture that the frame's image fills."""
-    fit = letterbox(frame.camera.width, frame.camera.height)
+def inside_bars(labels: UInt8[ndarray, "106 128"], fit: Letterbox) -> UInt8[ndarray, "r c"]:
+    """The part of the network's picture that the image fills."""
     return labels[fit.top : fit.top + fit.rows, fit.left : fit.left + fit.columns]
+
+
+def _cells(span: slice, step: int, count: int, first: int) -> tuple[ndarray, int]:
+    """The cells in which every n-th pixel of a span lies, and the number of the first of them."""
+    begin = -(-span.start // step)
+    pixels = np.arange(begin * step, span.stop, step) - span.start
+    return (2 * pixels + 1) * count // (2 * (span.stop - span.start)) + first, begin

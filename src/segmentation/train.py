@@ -8,14 +8,12 @@ steps, and on one CPU, a run that was stopped ends with the same bits as one tha
 
 from __future__ import annotations
 
-import json
 import signal
 import threading
 import time
-import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,14 +26,13 @@ from kintrack import __version__
 from kintrack.result import write_json
 from segmentation.augment.sample import AugmentConfig, Bank
 from segmentation.calibrate import calibrated
-from segmentation.checkpoint import Checkpoint, latest_checkpoint, save_checkpoint
-from segmentation.curves import CURVES_FILE, LOG_FILE, append_log, draw_curves, read_log, write_log
+from segmentation.curves import CURVES_FILE, LOG_FILE, append_log, draw_curves, read_log
 from segmentation.dataset import Batches, Pictures, Split
-from segmentation.errors import SegmentationError
 from segmentation.evaluate import N, Scores, scores_of
 from segmentation.learner import Group, Learner, check_finite, join_group
 from segmentation.networks import folded
 from segmentation.prepared import Prepared, PreparedBatches
+from segmentation.resuming import Run, keep, mark_of, plain, resume
 from segmentation.training_config import TrainConfig
 from segmentation.weights import Weights, save_weights
 
@@ -59,20 +56,6 @@ class TrainProgress:
     left_s: float
     """Time left [s]."""
     scores: Scores | None
-    """Of the last validation."""
-
-
-@dataclass
-class Run:
-    """What changes as training goes on, beside the network."""
-
-    step: int = 0
-    """Steps done."""
-    elapsed_s: float = 0.0
-    """Time spent, before and since the last resumption [s]."""
-    losses: list[float] = field(default_factory=list)
-    """Losses that are not in the log yet."""
-    scores: Scores | None = None
     """Of the last validation."""
 
 
@@ -111,9 +94,9 @@ def train(
     identity = {
         "config": config.identity(),
         "data": [data.train.crc(), data.validation.crc()],
-        "start": None if start is None else _crc(start),
+        "start": None if start is None else mark_of(start),
     }
-    run = _resume(output, learner, identity)
+    run = resume(output, learner, identity)
     if group.leads:
         output.mkdir(parents=True, exist_ok=True)
         write_json(output / RUN_FILE, {**asdict(config), "facts": facts or {}})
@@ -121,7 +104,7 @@ def train(
     path = output / WEIGHTS_FILE
     if group.leads:
         run.scores = validate(learner, data.validation.spread(config.validation_frames))
-        _keep(output, learner, run, identity)
+        keep(output, learner, run, identity)
         weights = Weights(config.network, folded(learner.average))
         weights = calibrated(weights, _calibration(config, data.train, bank), group.device)
         shown = _facts(config, data, run, facts or {}, learner)
@@ -134,13 +117,16 @@ def train(
 
 
 def validate(learner: Learner, pictures: Pictures) -> Scores:
-    """Scores of the averaged network on pictures as they are; every other one without colour."""
+    """Scores of the averaged network on unchanged pictures.
+
+    They take turns: whole with colour, whole without, a closer look with colour, one without.
+    """
     from segmentation.augment.sample import plain_sample
 
     counts = np.zeros((N, N), dtype=np.int64)
     for first in range(0, len(pictures), VALIDATION_BATCH):
         numbers = range(first, min(first + VALIDATION_BATCH, len(pictures)))
-        samples = [plain_sample(pictures[n], depth_only=n % 2 == 1) for n in numbers]
+        samples = [plain_sample(pictures[n], n % 2 == 1, n % 4 > 1) for n in numbers]
         counts += learner.judge(
             np.stack([sample.image for sample in samples]),
             np.stack([sample.labels for sample in samples]),
@@ -163,7 +149,7 @@ def _loop(config, learner, run, data, bank, prepared, output, identity, on_progr
             share = config.share(run.step, run.elapsed_s)
             if stop:
                 if group.leads:
-                    _keep(output, learner, run, identity)
+                    keep(output, learner, run, identity)
                 raise KeyboardInterrupt
             if share >= 1.0:
                 break
@@ -189,56 +175,11 @@ def _loop(config, learner, run, data, bank, prepared, output, identity, on_progr
                 draw_curves(read_log(output / LOG_FILE), output / CURVES_FILE)
             if time.monotonic() - saved >= 60 * config.checkpoint_minutes:
                 run.elapsed_s = time.monotonic() - began
-                _keep(output, learner, run, identity)
+                keep(output, learner, run, identity)
                 saved = time.monotonic()
             done = max(config.share(run.step, time.monotonic() - began), 1e-9)
             left_s = (time.monotonic() - began) * (1.0 - done) / done
             on_progress(TrainProgress(run.step, done, mean, left_s, run.scores))
-
-
-def _resume(output: Path, learner: Learner, identity: dict[str, Any]) -> Run:
-    """Where to go on; the log is cut to that step."""
-    found = latest_checkpoint(output) if output.is_dir() else None
-    if found is None:
-        if learner.group.leads and (output / LOG_FILE).is_file():
-            (output / LOG_FILE).unlink()
-        return Run()
-    for key, ours in identity.items():
-        theirs = found.facts.get(key)
-        if theirs != _plain(ours):
-            raise SegmentationError(f"{output} holds another run: {_difference(key, theirs, ours)};"
-                                    " choose another folder, or the same options")  # fmt: skip
-    learner.restore(found.tensors)
-    if learner.group.leads:
-        entries = [e for e in read_log(output / LOG_FILE) if e["step"] <= found.step]
-        write_log(output / LOG_FILE, entries)
-    return Run(found.step, found.facts["elapsed_s"], list(found.facts["losses"]))
-
-
-def _keep(output: Path, learner: Learner, run: Run, identity: dict[str, Any]) -> None:
-    facts = {**identity, "elapsed_s": run.elapsed_s, "losses": run.losses}
-    save_checkpoint(output, Checkpoint(run.step, learner.tensors(), facts))
-
-
-def _crc(weights: Weights) -> str:
-    """Tells these weights from others."""
-    crc = 0
-    for name in sorted(weights.tensors):
-        crc = zlib.crc32(np.ascontiguousarray(weights.tensors[name]).tobytes(), crc)
-    return f"weights {crc:08x}"
-
-
-def _plain(value: Any) -> Any:
-    """As it comes back from JSON."""
-    return json.loads(json.dumps(value))
-
-
-def _difference(key: str, theirs: Any, ours: Any) -> str:
-    ours = _plain(ours)
-    if not isinstance(theirs, dict) or not isinstance(ours, dict):
-        return f"its {key} is {theirs}, not {ours}"
-    names = [name for name in ours if theirs.get(name) != ours[name]]
-    return ", ".join(f"its {name} is {theirs.get(name)}, not {ours[name]}" for name in names)
 
 
 def _loader(
@@ -297,7 +238,7 @@ def _facts(config: TrainConfig, data: Split, run: Run, facts, learner: Learner) 
         "device": str(learner.group.device),
         "processes": learner.group.world,
         "precision": "bf16" if learner.bf16 else "fp32",
-        "config": _plain(asdict(config)),
+        "config": plain(asdict(config)),
         "steps": run.step,
         "hours": round(run.elapsed_s / 3600, 4),
         "training_pictures": len(data.train),

@@ -16,7 +16,7 @@ from kintrack.export import PART_COLORS, contact_sheet
 from kintrack.export.overlay import depth_picture, depth_range
 from kintrack.result import write_atomically, write_json
 from segmentation.before_after import Shown
-from segmentation.labels import BACKGROUND, IGNORED, LABELS
+from segmentation.labels import LABELS, person_of
 from segmentation.preprocess import DEPTH_SCALE, HOLE, REFERENCE_DEPTH_M
 
 JSON_FILE, TEXT_FILE, PICTURE_FILE = "report.json", "report.md", "report.png"
@@ -190,7 +190,7 @@ def _sheet(shown: Sequence[Shown]) -> UInt8[ndarray, "h w 3"]:
         plane = one.sample.image[3]
         depth = np.where(plane >= HOLE, 0.0, REFERENCE_DEPTH_M * np.exp(DEPTH_SCALE * plane))
         picture = depth_picture(depth, depth_range(depth))
-        box = _around(_on(one.sample.labels))
+        box = _around(person_of(one.sample.labels))
         for labels in (None, one.sample.labels, one.start, one.tuned):
             whole = picture if labels is None else _painted(picture, labels)
             size = (TILE_PX - 4, TILE_PX - 4)  # the sheet parts tiles by 4 px
@@ -210,16 +210,12 @@ def _around(mask: Bool[ndarray, "h w"]) -> tuple[slice, slice]:
     return spans[0], spans[1]
 
 
-def _on(labels: UInt8[ndarray, "h w"]) -> Bool[ndarray, "h w"]:
-    return np.asarray((labels != BACKGROUND) & (labels != IGNORED))
-
-
 def _painted(
     picture: UInt8[ndarray, "h w 3"], labels: UInt8[ndarray, "h w"]
 ) -> UInt8[ndarray, "h w 3"]:
     """Label colours over depth."""
     out = picture.astype(float)
-    on = _on(labels)
+    on = person_of(labels)
     out[on] += 0.75 * (PART_COLORS[labels[on]] - out[on])
     return out.astype(np.uint8)
 

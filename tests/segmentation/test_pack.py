@@ -13,8 +13,10 @@ from training_data import CAMERA, figure, record
 from kintrack.errors import DatasetError
 from kintrack.sequence.frame import Frame
 from segmentation import pack as module
+from segmentation import pack_files
 from segmentation.dataset import Pictures, everything, split
-from segmentation.pack import DEPTH_UNIT_M, open_pack, pack, picture
+from segmentation.pack import pack
+from segmentation.pack_files import DEPTH_UNIT_M, open_pack, picture
 from segmentation.picture import checked, reduced
 
 
@@ -144,7 +146,7 @@ def test_no_recording_both_trains_and_validates(original):
 
 def rewritten(root, facts):
     entries, _ = open_pack(root / ".pack")
-    lines = [module._line(replace(e, facts=f)) for e, f in zip(entries, facts, strict=True)]
+    lines = [pack_files._line(replace(e, facts=f)) for e, f in zip(entries, facts, strict=True)]
     (root / ".pack/sequences.jsonl").write_text("".join(lines))
     return [root / ".pack"]
 

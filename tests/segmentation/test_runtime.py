@@ -207,6 +207,25 @@ def test_neither_torch_nor_nncf_is_needed_to_label_in_int8(slim, tmp_path):
     assert done.stdout.strip() == "(7, 106, 128)", done.stderr
 
 
+def test_a_process_can_still_be_interrupted_after_its_segmenters_are_gone(slim, tmp_path):
+    save_weights(tmp_path / "w", slim)
+    program = """
+import os, signal, sys
+from pathlib import Path
+from segmentation.runtime import RuntimeConfig, load_segmenter
+kept = [load_segmenter(Path(sys.argv[1]), RuntimeConfig("openvino")) for _ in range(2)]
+while kept:
+    del kept[0]
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    command = [sys.executable, "-X", "faulthandler", "-c", program, str(tmp_path / "w")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "interrupted", (done.returncode, done.stderr)
+
+
 def test_a_broken_file_is_no_reason_to_fall_back(tmp_path):
     (tmp_path / "w").write_bytes(b"half")
     with pytest.raises(WeightsError, match="no whole weights file"):

@@ -1,25 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from kintrack.association.labelling import labels_of_pixels
 from kintrack.geometry import PinholeCamera
-from kintrack.segmenter import checked_labels
+from kintrack.segmenter import Region, checked_labels
 from kintrack.sequence.frame import Frame
 from segmentation.labels import IGNORED
-from segmentation.preprocess import letterbox
-from segmentation.tracking import ImageSegmenter, TrueSegmenter, inside_bars
+from segmentation.preprocess import HOLE
+from segmentation.tracking import ImageSegmenter, TrueSegmenter
 
 
-class Bars:
-    """A network that says head in the bars and torso in the image."""
+class Patches:
+    """A network that takes what is nearest for the torso, and holes for the head."""
 
     runtime = "none"
 
-    def segment(self, frame):
-        labels = np.ones((106, 128), dtype=np.uint8)
-        fit = letterbox(frame.camera.width, frame.camera.height)
-        labels[fit.top : fit.top + fit.rows, fit.left : fit.left + fit.columns] = 2
-        return labels
+    def __init__(self):
+        self.seen = []
+
+    def logits_of(self, image):
+        self.seen.append(image)
+        labels = np.where(image[3] == HOLE, 1, np.where(image[3] < image[3].min() + 1.0, 2, 0))
+        return (np.arange(7)[:, None, None] == labels).astype(np.float32)
 
 
 def frame(width, height, labels=None):
@@ -27,12 +32,45 @@ def frame(width, height, labels=None):
     return Frame(0, 0.0, camera, np.full((height, width), 2.0, np.float32), labels=labels)
 
 
+def person(width, height):
+    """A frame with somebody 2 m away before a wall at 5 m, left of the middle."""
+    shown = frame(width, height)
+    depth = np.full((height, width), 5.0, np.float32)
+    depth[height // 4 : 3 * height // 4, width // 4 : width // 2] = 2.0
+    return replace(shown, depth_m=depth)
+
+
 @pytest.mark.parametrize("size", [(512, 424), (320, 240), (640, 480), (240, 320)])
-def test_the_bars_are_cut_off_and_what_is_left_covers_the_image(size):
-    shown = frame(*size)
-    labels = checked_labels(ImageSegmenter(Bars()), shown)
-    assert (labels == 2).all()
-    assert np.array_equal(labels, inside_bars(Bars().segment(shown), shown))
+@pytest.mark.parametrize("closer", [False, True])
+def test_labels_cover_the_image_without_the_pictures_bars(size, closer):
+    shown = person(*size)
+    labels = checked_labels(ImageSegmenter(Patches(), closer), shown)
+    right = labels_of_pixels(labels, shown.depth_m) == np.where(shown.depth_m < 3, 2, 0)
+    assert right.mean() > 0.97 and 1 not in labels
+
+
+def test_the_second_look_is_a_closer_one_and_sharper():
+    network, shown = Patches(), replace(person(512, 424))
+    labels = checked_labels(ImageSegmenter(network), shown)
+    whole, closer = network.seen
+    assert closer[3].min() < whole[3].min() - 0.3
+    off = labels_of_pixels(labels, shown.depth_m) != np.where(shown.depth_m < 3, 2, 0)
+    once = labels_of_pixels(ImageSegmenter(Patches(), False).segment(shown), shown.depth_m)
+    assert off.sum() < (once != np.where(shown.depth_m < 3, 2, 0)).sum()
+
+
+def test_a_known_region_takes_one_look_and_is_blind_to_all_else():
+    network, shown = Patches(), person(512, 424)
+    shown.depth_m[:, -20:] = 2.0
+    labels = checked_labels(ImageSegmenter(network), shown, Region((192.0, 212.0), 2.0))
+    assert len(network.seen) == 1
+    assert labels[106, 96] == 2 and not labels[:, -10:].any()
+
+
+def test_a_region_off_the_image_is_as_good_as_none():
+    network = Patches()
+    checked_labels(ImageSegmenter(network), person(512, 424), Region((5000.0, 0.0), 2.0))
+    assert len(network.seen) == 2
 
 
 @pytest.mark.parametrize("size", [(512, 424), (320, 240)])

@@ -24,12 +24,14 @@ SIDE_PX = 96
 """Cut-outs are squares of this side [px]."""
 SMALL = ("cup", "phone", "bottle")
 """Kinds that hide nothing of a person."""
+NAMELESS = 0.5
+"""Share of the cut-outs that are of no kind of thing."""
 VIEWS = 4
 """Views of each thing."""
 ROOM_VIEWS = 2
 """Views of each room."""
 ENTRY = "kintrack.bank"
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,7 @@ def _bank(tensors: dict[str, ndarray]) -> Bank:
 
 def _thing_views(rng: np.random.Generator, count: int) -> list[tuple[ndarray, ndarray, float]]:
     """Relief, colour and span of some views of a thing that is drawn."""
+    from synthesis.objects.assembly import assembly
     from synthesis.objects.catalogue import training_things
     from synthesis.render.lights import draw_lights
     from synthesis.render.stage import Stage
@@ -132,7 +135,8 @@ def _thing_views(rng: np.random.Generator, count: int) -> list[tuple[ndarray, nd
     from synthesis.sensors.sensor import rays
 
     makers = {name: make for name, make in training_things().items() if name not in SMALL}
-    mesh = makers[str(rng.choice(sorted(makers)))](rng).mesh
+    make = makers[str(rng.choice(sorted(makers)))]
+    mesh = (assembly if rng.random() < NAMELESS else make)(rng).mesh
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     stage = Stage(mesh, None, draw_lights(rng))

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 from numba import njit
 from numpy import ndarray
 
 from segmentation.labels import IGNORED, INPUT_HEIGHT, INPUT_WIDTH, MIRRORED
 from segmentation.picture import Picture
-from segmentation.preprocess import letterbox
+from segmentation.preprocess import REFERENCE_DEPTH_M, letterbox
+from segmentation.region import cells_per_pixel
 
 WINDOWS = ((512, 424), (640, 480), (640, 576), (1280, 720))
 """Images of usual cameras; all but the first leave bars in the network's picture."""
@@ -86,6 +87,58 @@ def draw_warp(
     roll = math.radians(rng.normal(0.0, roll_deg)) if rng.random() < 0.5 else 0.0
     return Warp(zoom, (center[0], center[1]), roll, bool(rng.random() < 0.5),
                 (fit.columns, fit.rows))  # fmt: skip
+
+
+def around(picture: Picture, person: Int[ndarray, " n"]) -> Warp:
+    """The window of a closer look at a person (`region.py`).
+
+    Args:
+        picture: The picture.
+        person: Indices of the person's pixels in the flat picture, at least one.
+    """
+    v, u = np.divmod(person, picture.labels.shape[1])
+    depths = picture.depth_m.ravel()[person]
+    depth = float(np.median(depths[depths > 0])) if (depths > 0).any() else REFERENCE_DEPTH_M
+    zoom = cells_per_pixel(depth, picture.focal_px)
+    return Warp(zoom, (0.5 * float(u.min() + u.max()), 0.5 * float(v.min() + v.max())))
+
+
+def draw_around(
+    picture: Picture, person: Int[ndarray, " n"], rng: np.random.Generator, roll_deg: float
+) -> Warp:
+    """Draw a window that is off by as much as that of a person who is hidden in part may be.
+
+    Args:
+        picture: The picture.
+        person: Indices of the person's pixels in the flat picture, at least one.
+        rng: Draws.
+        roll_deg: Standard deviation of the roll [deg]; half of the windows have none.
+    """
+    best = around(picture, person)
+    zoom = best.zoom * math.exp(rng.normal(0.0, 0.15))
+    spot = divmod(int(person[rng.integers(len(person))]), picture.labels.shape[1])[::-1]
+    share = rng.uniform(0.0, 0.8) if rng.random() < 0.5 else 0.0
+    off = rng.normal(0.0, 5.0, 2) / zoom
+    u, v = (
+        (1.0 - share) * c + share * x + d for c, x, d in zip(best.center, spot, off, strict=True)
+    )
+    roll = math.radians(rng.normal(0.0, roll_deg)) if rng.random() < 0.5 else 0.0
+    return Warp(zoom, (float(u), float(v)), roll, bool(rng.random() < 0.5))
+
+
+def cut(view: Picture, rng: np.random.Generator) -> Picture:
+    """The view with an edge of the image through it: what lies beyond is bar."""
+    depth, labels = view.depth_m.copy(), view.labels.copy()
+    color = None if view.color is None else view.color.copy()
+    sides = rng.permutation(4)[: 1 + int(rng.integers(0, 3) == 0)]
+    for side in sides:
+        count = int(rng.uniform(0.1, 0.55) * (INPUT_HEIGHT, INPUT_WIDTH)[side % 2])
+        part = slice(0, count) if side < 2 else slice(-count, None)
+        where = (part, slice(None)) if side % 2 == 0 else (slice(None), part)
+        depth[where], labels[where] = 0.0, IGNORED
+        if color is not None:
+            color[where] = 0
+    return Picture(depth, color, labels, view.focal_px)
 
 
 def warped(

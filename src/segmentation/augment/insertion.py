@@ -7,15 +7,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Float, UInt8
 from numba import njit
 from numpy import ndarray
 
-from segmentation.labels import BACKGROUND, IGNORED
+from segmentation.labels import BACKGROUND, person_of
 from segmentation.picture import Picture
 
 SCALES = (0.6, 1.6)
 """How much larger than life a cut-out may be."""
+STRETCH = 0.2
+"""Standard deviation of the logarithm of its width over its height, which were 1."""
 BEFORE = 0.75
 """Share of the cut-outs that stand before the person; the others anywhere about her depth."""
 GAP_M = (0.02, 0.9)
@@ -45,11 +47,6 @@ class Cutouts:
 
     def __len__(self) -> int:
         return len(self.relief_m)
-
-
-def person_of(labels: UInt8[ndarray, "h w"]) -> Bool[ndarray, "h w"]:
-    """Where the person is seen."""
-    return np.asarray((labels != BACKGROUND) & (labels != IGNORED))
 
 
 def insert(
@@ -89,7 +86,7 @@ def insert(
         turn = rng.uniform(-math.pi, math.pi) if rng.random() < 0.15 else rng.normal(0.0, 0.12)
         row, column = divmod(int(person[rng.integers(len(person))]), picture.depth_m.shape[1])
         center = [column, row] + rng.normal(0.0, SPREAD * math.sqrt(len(person)), 2)
-        flip = -1.0 if rng.random() < 0.5 else 1.0
+        flip = math.exp(rng.normal(0.0, STRETCH)) * (-1.0 if rng.random() < 0.5 else 1.0)
         noise_m = rng.uniform(0.0, 0.002) * middle_m**2
         seed = np.uint64(rng.integers(1 << 62))
         if middle_m + scale * float(np.nanmin(relief)) < NEAREST_M:

@@ -12,17 +12,11 @@ from numpy import ndarray
 
 from kintrack.config import check_bounds
 from segmentation.augment.color import recolored
-from segmentation.augment.geometry import Warp, draw_warp, warped, whole
-from segmentation.augment.insertion import (
-    Cutouts,
-    insert,
-    person_of,
-    put_behind,
-    without_background,
-)
+from segmentation.augment.geometry import Warp, around, cut, draw_around, draw_warp, warped, whole
+from segmentation.augment.insertion import Cutouts, insert, put_behind, without_background
 from segmentation.augment.noise import draw_faults, spoilt
 from segmentation.errors import SegmentationError
-from segmentation.labels import BACKGROUND, IGNORED
+from segmentation.labels import BACKGROUND, IGNORED, person_of
 from segmentation.picture import Picture
 from segmentation.preprocess import network_input
 
@@ -38,15 +32,19 @@ CROPS = 8
 class AugmentConfig:
     """How often what happens to a sample."""
 
-    zoomed: float = 0.85
-    """Chance of zoom, shift, crop, roll and another image shape."""
+    region: float = 0.5
+    """Chance of the window around the person that a closer look shows (`region.py`)."""
+    zoomed: float = 0.7
+    """Else, chance of zoom, shift, crop, roll and another image shape."""
     zooms: tuple[float, float] = (0.9, 2.2)
     """Least and greatest magnification."""
     roll_deg: float = 6.0
     """Standard deviation of the camera's roll [deg]; half of the zoomed samples have none."""
+    cut: float = 0.25
+    """Chance that a window around the person ends at an edge of the image."""
     mirrored: float = 0.5
     """Chance that left and right are swapped."""
-    inserted: float = 0.6
+    inserted: float = 0.75
     """Chance of inserted objects; 0 for the ablation without."""
     most_hidden: float = 0.6
     """Greatest share of the person that one object may hide."""
@@ -66,8 +64,9 @@ class AugmentConfig:
     """Standard deviation of the relative error of the focal length."""
 
     def __post_init__(self) -> None:
-        chances = ("zoomed", "mirrored", "inserted", "most_hidden", "nobody", "other_room",
-                   "background_removed", "depth_only", "recolored", "spoilt")  # fmt: skip
+        chances = ("region", "zoomed", "cut", "mirrored", "inserted", "most_hidden", "nobody",
+                   "other_room", "background_removed", "depth_only", "recolored",
+                   "spoilt")  # fmt: skip
         check_bounds(self, roll_deg=(0, 45), focal_spread=(0, 0.2),
                      **dict.fromkeys(chances, (0.0, 1.0)))  # fmt: skip
         if len(self.zooms) != 2 or not 0.25 <= self.zooms[0] <= self.zooms[1] <= 8.0:
@@ -97,9 +96,10 @@ class Sample(NamedTuple):
     """Its labels, with `IGNORED`."""
 
 
-def plain_sample(picture: Picture, depth_only: bool = False) -> Sample:
-    """The picture as it is."""
-    view = warped(picture, whole(picture))
+def plain_sample(picture: Picture, depth_only: bool = False, closer: bool = False) -> Sample:
+    """The picture as it is, or as a closer look at the person shows it."""
+    person = np.flatnonzero(person_of(picture.labels)) if closer else np.zeros(0, dtype=int)
+    view = warped(picture, around(picture, person) if len(person) else whole(picture))
     return as_sample(view._replace(color=None) if depth_only else view)
 
 
@@ -134,7 +134,7 @@ def changed(
         elif bank.rooms and chance["room"] < (EMPTY_ROOMED if bare else config.other_room):
             view = put_behind(view, _room(bank, rng, like=view), 0.4, rng)
         if rng.random() < config.inserted:
-            for _ in range(1 + int(rng.integers(0, 3) == 0)):
+            for _ in range(1 + int(rng.integers(0, 2))):
                 view = insert(view, bank.cutouts, config.most_hidden * rng.uniform(0.3, 1.0), rng)
     color = view.color
     if chance["color"] < config.depth_only:
@@ -164,8 +164,11 @@ def as_sample(
 def _view(picture: Picture, config: AugmentConfig, rng: np.random.Generator) -> Picture:
     """A view of a picture, most often with the person in it."""
     shift = (0.0, 0.0) if rng.random() < 0.6 else tuple(rng.normal(0.0, 1.0, 2))
-    if rng.random() < config.zoomed:
-        person = np.flatnonzero(person_of(picture.labels))
+    person = np.flatnonzero(person_of(picture.labels))
+    near = len(person) > 0 and rng.random() < config.region
+    if near:
+        warp = draw_around(picture, person, rng, config.roll_deg)
+    elif rng.random() < config.zoomed:
         at = None
         if len(person) and rng.random() < 0.9:
             spot = int(person[rng.integers(len(person))])
@@ -174,8 +177,9 @@ def _view(picture: Picture, config: AugmentConfig, rng: np.random.Generator) -> 
     else:
         warp = whole(picture)
     mirrored = bool(rng.random() < config.mirrored)
-    return warped(picture, Warp(warp.zoom, warp.center, warp.roll_rad, mirrored, warp.window),
-                  (shift[0], shift[1]))  # fmt: skip
+    warp = Warp(warp.zoom, warp.center, warp.roll_rad, mirrored, warp.window)
+    view = warped(picture, warp, (shift[0], shift[1]))
+    return cut(view, rng) if near and rng.random() < config.cut else view
 
 
 def _room(bank: Bank, rng: np.random.Generator, like: Picture | None = None) -> Picture:

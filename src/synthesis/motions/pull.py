@@ -9,11 +9,11 @@ import numpy as np
 from numpy import ndarray
 
 from kintrack.body import BodyState, joint_jacobians
-from kintrack.residuals.linearization import Linearization, Quadratic, quadratic_of
+from kintrack.residuals.linearization import Linearization, Residual
 
 
 @dataclass(frozen=True)
-class Pull:
+class Pull(Residual):
     """Directions of bones and link axes and places of joints; 0.5 sum_i (r_i / sigma_i)^2.
 
     r = (x_child - x_parent) / length - direction for bones, R_link e_axis - direction for axes,
@@ -54,10 +54,6 @@ class Pull:
         J_bones = (J[children] - J[parents]) / lengths[:, :, None]
         stacked = np.concatenate([J_bones, J_axes, J[self.joints[0]]])
         return Linearization(r.ravel(), stacked.reshape(-1, state.body.nv), self._weights())
-
-    def quadratic(self, state: BodyState) -> Quadratic:
-        """J^T W J, J^T W r and the cost."""
-        return quadratic_of(self.linearize(state))
 
     def cost(self, state: BodyState) -> float:
         """0.5 sum_i w_i r_i^2."""

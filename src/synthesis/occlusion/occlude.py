@@ -11,13 +11,14 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from kintrack.config import check_bounds
 from kintrack.errors import SceneError
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.joints import JOINT_NAMES
 from kintrack.result import write_json
 from kintrack.sequence.frame import Frame, SequenceReader
 from kintrack.sequence.occlusion import OCCLUSION_FILE, read_occlusion
-from kintrack.sequence.reference import read_reference_joints
+from kintrack.sequence.reference import REFERENCE_FILE, read_reference_joints
 from kintrack.sequence.write import SequenceWriter
 from synthesis.mesh import Mesh
 from synthesis.objects.thing import Thing
@@ -51,8 +52,7 @@ class OccludeConfig:
     def __post_init__(self) -> None:
         if self.sensor not in ("auto", *SENSORS):
             raise SceneError(f"sensor = {self.sensor!r}; allowed: auto, {', '.join(SENSORS)}")
-        if not 0.0 <= self.scene_share <= 0.8:
-            raise SceneError(f"scene_share = {self.scene_share!r}; 0 to 0.8 are allowed")
+        check_bounds(self, scene_share=(0, 0.8))
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def _insert(frame: Frame, layers, rng) -> tuple[Frame, Float[ndarray, "h w"]]:
 
 
 def _reference(sequence: SequenceReader) -> tuple[tuple[str, ...], Float[ndarray, "n j 3"]]:
-    path = sequence.root / "reference_joints.csv"
+    path = sequence.root / REFERENCE_FILE
     if not path.is_file():
         return (), np.zeros((0, 0, 3))
     return read_reference_joints(path)

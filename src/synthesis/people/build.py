@@ -16,12 +16,12 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 from threadpoolctl import threadpool_limits
 
-from kintrack.body import model_folder, read_arrays
 from kintrack.errors import ModelError
 from kintrack.modelling.build import head_centre
 from kintrack.modelling.skeleton import links
 from kintrack.modelling.source import R_ROOT_SOURCE, dense_weights, joint_points
 from kintrack.modelling.surface import transfer
+from kintrack.rig import model_folder, read_arrays
 from synthesis.people.hands import HANDS, curled
 from synthesis.people.population import FILE, SIDES
 

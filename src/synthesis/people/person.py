@@ -9,16 +9,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.body import (
-    Body,
-    Rig,
-    load_body,
-    load_rig,
-    model_folder,
-    rigged_body,
-    run_kinematics,
-)
+from kintrack.body import Body, load_body, rigged_body, run_kinematics
 from kintrack.geometry import invert_rigid
+from kintrack.rig import Rig, load_rig, model_folder
 from kintrack.skin import Skin, load_skin, skinned_vertices
 from synthesis.people.population import SIDES, Facts, Hands, load_population
 

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from kintrack.body import read_arrays
 from kintrack.errors import SceneError
+from kintrack.rig import read_arrays
 
 FILE = Path(__file__).with_name("population.npz")
 """The population that ships."""

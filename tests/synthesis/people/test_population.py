@@ -2,8 +2,8 @@
 import numpy as np
 import pytest
 
-from kintrack.body import load_rig, model_folder
 from kintrack.errors import ModelError, SceneError
+from kintrack.rig import load_rig, model_folder
 from kintrack.skin import load_skin
 from synthesis.people.population import (
     FILE,

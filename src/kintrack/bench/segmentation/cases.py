@@ -7,11 +7,9 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
+from kintrack.bench.cases import CLEAN, DISTANCES_M, OBJECTS
 from kintrack.sequence.folder import open_folder
 
-CLEAN = "clean"
-DISTANCES_M = (0.30, 0.45, 0.60)
-"""From the object's farthest point to the person's nearest place [m] [Wan19]."""
 WITNESS_FILE = "reference_mediapipe.csv"
 MASK_FOLDER = "mask"
 REAL_SCENES = ("uva_turn", "bonn_tablet", "bonn_three", "sofa")
@@ -56,10 +54,10 @@ class Case:
 
 def condition_of(distance_m: float | None) -> str:
     """Name of a distance."""
-    return CLEAN if distance_m is None else f"{100 * distance_m:.0f} cm"
+    return CLEAN if distance_m is None else OBJECTS[DISTANCES_M.index(distance_m)]
 
 
-CONDITIONS = tuple(condition_of(d) for d in (None, *DISTANCES_M))
+CONDITIONS = (CLEAN, *OBJECTS)
 
 
 def real_scenes(data: Path) -> list[Case]:

@@ -10,13 +10,14 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.bench.segmentation.cases import CLEAN, Case
+from kintrack.bench.cases import CLEAN
+from kintrack.bench.segmentation.cases import Case
 from kintrack.bench.segmentation.witness import OWN, JointCounts, witness_summary
 from kintrack.joints import JOINT_NAMES
 from kintrack.sequence.folder import open_folder
 from kintrack.sequence.frame import Frame
 from kintrack.sequence.occlusion import OCCLUSION_FILE, read_occlusion
-from kintrack.sequence.reference import read_reference_joints
+from kintrack.sequence.reference import REFERENCE_FILE, read_reference_joints
 from segmentation.evaluate import true_labels
 from segmentation.preprocess import HOLE, frame_input
 
@@ -36,7 +37,7 @@ def ceiling(cases: Sequence[Case]) -> dict[str, Any]:
     """
     counts = JointCounts()
     for case in cases:
-        path = case.sequence / "reference_joints.csv"
+        path = case.sequence / REFERENCE_FILE
         files = (path, case.sequence / OCCLUSION_FILE)
         if case.condition != CLEAN or not all(file.is_file() for file in files):
             continue

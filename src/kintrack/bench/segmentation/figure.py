@@ -14,15 +14,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy import ndarray
 
-from kintrack.bench.segmentation.cases import CLEAN, COMPOSITES, CONDITIONS, TEST
+from kintrack.bench.cases import CLEAN
+from kintrack.bench.segmentation.cases import COMPOSITES, CONDITIONS, TEST
 from kintrack.bench.segmentation.networks import Network
-from kintrack.bench.segmentation.samples import DEPTH, RGBD, Sample, samples
+from kintrack.bench.segmentation.samples import DEPTH, MODALITIES, RGBD, Sample, samples
 from kintrack.bench.segmentation.summary import OBJECTS, Judged
 from kintrack.bench.segmentation.witness import OWN
 from kintrack.result import write_atomically
 from segmentation.labels import IGNORED, LABELS
 from segmentation.preprocess import COLOR_MIDDLE, COLOR_SCALE, FARTHEST, HOLE, NEAREST, letterbox
-from segmentation.runtime import labels_of
 
 SYNTHETIC_FILE, REAL_FILE = "segmentation.png", "segmentation_real.png"
 PAINT = np.array(
@@ -173,7 +173,7 @@ def _draw_joints(axes: Sequence[Axes], sample: Sample, labels: UInt8[ndarray, "1
 
 
 def _labels(network: Network, sample: Sample, modality: str) -> UInt8[ndarray, "106 128"]:
-    return labels_of(network.segmenter.logits_of(sample.shown(modality)))
+    return sample.labels_by(network.segmenter, modality)
 
 
 def _show(axis: Axes, picture: ndarray, title: str) -> None:
@@ -183,12 +183,12 @@ def _show(axis: Axes, picture: ndarray, title: str) -> None:
 
 
 def _over_distance(axis: Axes, content: dict[str, Any]) -> None:
-    """Non-background IoU over the object's distance; depth only is dashed."""
+    """Non-background IoU over the object's distance; depth only is dashed, one look is dotted."""
     by_network = content["labels"].get(TEST, {})
     order = (CLEAN, *reversed(CONDITIONS[1:]))
     for n, name in enumerate(content["order"]):
         modalities = by_network.get(name, {})
-        for modality, style in ((RGBD, "-"), (DEPTH, "--")):
+        for modality, style in zip(MODALITIES, ("-", ":", "--", "-."), strict=True):
             found = modalities.get(modality, {})
             values = [found.get(c, {}).get("non_background_iou") for c in order]
             heights = [np.nan if value is None else 100 * value for value in values]

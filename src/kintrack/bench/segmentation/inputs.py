@@ -7,15 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from kintrack.bench.segmentation.cases import (
-    CLEAN,
-    COMPOSITES,
-    DISTANCES_M,
-    TEST,
-    Case,
-    condition_of,
-    real_scenes,
-)
+from kintrack.bench.cases import CLEAN, DISTANCES_M
+from kintrack.bench.segmentation.cases import COMPOSITES, TEST, Case, condition_of, real_scenes
 from kintrack.bench.segmentation.config import SegmentationBenchConfig
 from kintrack.bench.segmentation.making import Composite, Excerpt, make_all, spread
 from kintrack.errors import DatasetError

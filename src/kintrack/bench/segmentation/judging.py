@@ -15,13 +15,12 @@ from numpy import ndarray
 
 from kintrack.bench.segmentation.cases import Case
 from kintrack.bench.segmentation.networks import Network
-from kintrack.bench.segmentation.samples import DEPTH, RGBD, Sample, samples
+from kintrack.bench.segmentation.samples import DEPTH, DEPTH_ONCE, MODALITIES, Sample, samples
 from kintrack.bench.segmentation.witness import JointCounts
 from kintrack.errors import DatasetError
 from kintrack.result import write_json
 from segmentation.evaluate import N, confusion, scores_of
 from segmentation.labels import BACKGROUND, IGNORED
-from segmentation.runtime import labels_of
 
 MIN_JOINTS = 6
 """A frame with fewer visible joints has no score of its own."""
@@ -92,19 +91,25 @@ def judge(
         on_frame: Called after every frame.
 
     Returns:
-        (network's name, `RGBD` or `DEPTH`) -> what `Tally.plain` tells.
+        (network's name, one of `MODALITIES`) -> what `Tally.plain` tells.
 
     Raises:
         DatasetError: if no frame can be judged.
         InputError: if a depth or a label is not what it must be.
     """
     fingerprint = case.fingerprint()
-    modalities = (RGBD, DEPTH) if (case.sequence / "rgb.txt").is_file() else (DEPTH,)
+    has_color = (case.sequence / "rgb.txt").is_file()
+    modalities = MODALITIES if has_color else (DEPTH, DEPTH_ONCE)
     found: dict[tuple[str, str], dict[str, Any]] = {}
     missing: list[tuple[Network, str, Path, str]] = []
     for network in networks:
         for modality in modalities:
-            place = folder / network.kept_in / modality.replace(" ", "_") / f"{case.key}.json"
+            place = (
+                folder
+                / network.kept_in
+                / modality.replace(",", "").replace(" ", "_")
+                / f"{case.key}.json"
+            )
             key = f"{network.digest} {network.segmenter.runtime} {digest} {fingerprint}"
             kept = _kept(place, key)
             if kept is None:
@@ -117,7 +122,7 @@ def judge(
     frames = 0
     for sample in samples(case):
         for network, modality, _, _ in missing:
-            labels = labels_of(network.segmenter.logits_of(sample.shown(modality)))
+            labels = sample.labels_by(network.segmenter, modality)
             tallies[network.name, modality].add(sample, labels)
         frames += 1
         on_frame()

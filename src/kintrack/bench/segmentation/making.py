@@ -8,7 +8,6 @@ is asked for.
 from __future__ import annotations
 
 import ast
-import hashlib
 import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -24,6 +23,8 @@ import kintrack.labelling
 from kintrack.bench import running
 from kintrack.bench.cases import REDRAWS, SHARE, pitch_of
 from kintrack.bench.digest import code_digest
+from kintrack.bench.inserting import view_of
+from kintrack.bench.made import MADE_FILE, finish, is_made, recipe_of
 from kintrack.errors import SceneError
 from kintrack.geometry import camera_pose
 from kintrack.joints import JOINT_NAMES
@@ -35,11 +36,8 @@ from kintrack.sequence.recording import Recording
 from kintrack.sequence.reference import read_reference_joints
 from kintrack.sequence.write import SequenceWriter
 from synthesis.objects.catalogue import held_out_things
-from synthesis.objects.cutout import load_scene_frame
 from synthesis.occlusion.occlude import OccludeConfig, occlude
 from synthesis.occlusion.placing import PlacingConfig
-
-MADE_FILE = "made.txt"
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class Excerpt:
     def recipe(self) -> str:
         """What the folder must have been made of."""
         code = "" if self.labelled else _labelling_digest()
-        return _digest(self.source.resolve(), _index(self.source), self.frames, code)
+        return recipe_of(self.source.resolve(), _index(self.source), self.frames, code)
 
     def run(self) -> None:
         """Make it."""
@@ -74,7 +72,7 @@ class Excerpt:
                 _thin(open_folder(whole), self.folder, self.frames)
             finally:
                 _fresh(whole)
-        _finish(self.folder, self.recipe())
+        finish(self.folder, self.recipe())
 
 
 @dataclass(frozen=True)
@@ -97,7 +95,7 @@ class Composite:
     def recipe(self) -> str:
         """What the folder must have been made of."""
         made = (self.clean / MADE_FILE).read_text() if (self.clean / MADE_FILE).is_file() else ""
-        return _digest(made, self.distance_m, self.scenes and self.scenes.name, self.seed)
+        return recipe_of(made, self.distance_m, self.scenes and self.scenes.name, self.seed)
 
     def run(self) -> None:
         """Make it; another object or view is drawn where one cannot be placed.
@@ -117,7 +115,7 @@ class Composite:
                     open_sequence(self.clean),
                     self.folder,
                     None if self.distance_m is None else thing,
-                    None if self.scenes is None else _view(self.scenes, view),
+                    None if self.scenes is None else view_of(self.scenes, view),
                     OccludeConfig(
                         PlacingConfig(distance_m=self.distance_m or 0.45, share=SHARE), seed=seed
                     ),
@@ -126,7 +124,7 @@ class Composite:
             except SceneError as error:
                 problem = error
                 continue
-            return _finish(self.folder, self.recipe())
+            return finish(self.folder, self.recipe())
         shutil.rmtree(self.folder, ignore_errors=True)
         raise problem
 
@@ -147,7 +145,7 @@ def make_all(
     Returns:
         Folder -> why it cannot be made.
     """
-    todo = [job for job in jobs if not is_made(job)]
+    todo = [job for job in jobs if not is_made(job.folder, job.recipe())]
     ready = len(jobs) - len(todo)
     for job in todo:
         _fresh(job.folder)
@@ -176,14 +174,6 @@ def _own_environment() -> Iterator[None]:
     finally:
         os.environ.clear()
         os.environ.update(before)
-
-
-def is_made(job: Making) -> bool:
-    """Whether a folder is there, whole, and made of what is asked for."""
-    try:
-        return (job.folder / MADE_FILE).read_text() == job.recipe()
-    except OSError:
-        return False
 
 
 def _thin(recording: Recording, folder: Path, frames: int) -> None:
@@ -219,11 +209,6 @@ def spread(count: int, most: int) -> list[int]:
     return [int(n) for n in np.unique(np.linspace(0, count - 1, min(count, most)).round())]
 
 
-def _view(scenes: Path, share: float):
-    count = len(list(scenes.glob("*.depth.png")))
-    return load_scene_frame(scenes, int(share * count))
-
-
 def _index(folder: Path) -> bytes:
     """Tells recordings of one folder and length from each other."""
     sizes = [path.stat().st_size for path in sorted((folder / "depth").glob("*.png"))]
@@ -235,16 +220,8 @@ def _labelling_digest() -> str:
     """Of the code that fits the body and makes labels of it."""
     folder = Path(kintrack.labelling.__file__).parent
     trees = [ast.dump(ast.parse(path.read_bytes())) for path in sorted(folder.glob("*.py"))]
-    return _digest(code_digest(), *trees)
+    return recipe_of(code_digest(), *trees)
 
 
 def _fresh(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
-
-
-def _finish(folder: Path, recipe: str) -> None:
-    (folder / MADE_FILE).write_text(recipe)
-
-
-def _digest(*facts: object) -> str:
-    return hashlib.sha256(repr(facts).encode()).hexdigest() + "\n"

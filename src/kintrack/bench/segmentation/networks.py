@@ -13,7 +13,8 @@ import segmentation
 from segmentation.runtime import NetworkSegmenter, RuntimeConfig, segmenter
 from segmentation.weights import Weights, load_weights
 
-DECIDING = ("architecture", "evaluate", "graph", "labels", "networks", "preprocess", "runtime")
+DECIDING = ("architecture", "evaluate", "graph", "labels", "networks", "preprocess", "region",
+            "runtime", "tracking")  # fmt: skip
 """Modules of `segmentation` that decide what a network of given weights labels."""
 JUDGING = ("judging", "samples", "witness")
 """Modules beside this one that decide how it is judged."""

@@ -13,7 +13,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from kintrack.bench.segmentation.cases import CLEAN, TEST, Case, frames_in
+from kintrack.bench.cases import CLEAN
+from kintrack.bench.segmentation.cases import TEST, Case, frames_in
 from kintrack.bench.segmentation.ceiling import ceiling
 from kintrack.bench.segmentation.config import SegmentationBenchConfig
 from kintrack.bench.segmentation.inputs import Inputs, Report, make_cases

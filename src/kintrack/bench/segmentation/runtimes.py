@@ -13,13 +13,16 @@ import numpy as np
 from numpy import ndarray
 
 from kintrack.bench.segmentation.samples import Sample
+from kintrack.segmenter import Region
 from kintrack.sequence.frame import Frame
 from segmentation.architecture import count_flops, count_operations, count_parameters
 from segmentation.errors import SegmentationError
 from segmentation.evaluate import N, confusion, scores_of
 from segmentation.labels import IGNORED
-from segmentation.preprocess import frame_input, labels_to_image
+from segmentation.preprocess import frame_input
+from segmentation.region import region_of_person
 from segmentation.runtime import NetworkSegmenter, RuntimeConfig, labels_of, segmenter
+from segmentation.tracking import ImageSegmenter
 from segmentation.weights import Weights
 
 VARIANTS = {
@@ -119,24 +122,35 @@ def agreement(
 def timing(
     variant: Variant, frames: Sequence[Frame], seconds: float
 ) -> dict[str, dict[str, float]]:
-    """Milliseconds a frame: the network alone, and from a frame to labels of its own size.
+    """Milliseconds a frame.
 
     Args:
         variant: A runtime.
-        frames: Frames to go round.
-        seconds: How long to measure each of both [s].
+        frames: Frames with true labels to go round.
+        seconds: How long to measure each [s].
+
+    Returns:
+        The network alone; from a frame to labels of its image while the person is tracked, so that
+        one look at her is enough; and at a start, which takes two.
     """
     images = [frame_input(frame) for frame in frames]
-    label = variant.segmenter.segment
-
-    def whole(n: int) -> None:
-        frame = frames[n % len(frames)]
-        labels_to_image(label(frame), frame.camera.width, frame.camera.height)
-
+    regions = [_region(frame) for frame in frames]
+    looking = ImageSegmenter(variant.segmenter)
+    count = len(frames)
     return {
-        "network": _timed(lambda n: variant.segmenter.logits_of(images[n % len(images)]), seconds),
-        "whole": _timed(whole, seconds),
+        "network": _timed(lambda n: variant.segmenter.logits_of(images[n % count]), seconds),
+        "tracking": _timed(
+            lambda n: looking.segment(frames[n % count], regions[n % count]), seconds
+        ),
+        "start": _timed(lambda n: looking.segment(frames[n % count]), seconds),
     }
+
+
+def _region(frame: Frame) -> Region | None:
+    """Where the true person is."""
+    if frame.labels is None or frame.depth_m is None:
+        return None
+    return region_of_person(frame.labels, frame.depth_m, frame.camera.fx)
 
 
 def _timed(call: Callable[[int], object], seconds: float) -> dict[str, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -23,9 +23,14 @@ from segmentation.errors import InputError
 from segmentation.evaluate import true_labels
 from segmentation.labels import BACKGROUND, IGNORED
 from segmentation.preprocess import HOLE, frame_input, labels_to_network
+from segmentation.runtime import NetworkSegmenter, labels_of
+from segmentation.tracking import ImageSegmenter
 
 RGBD, DEPTH = "RGB-D", "depth only"
-"""What a network is shown."""
+"""What a network is shown; the whole image first, then the person."""
+RGBD_ONCE, DEPTH_ONCE = "RGB-D, one look", "depth only, one look"
+"""The same, the whole image alone."""
+MODALITIES = (RGBD, RGBD_ONCE, DEPTH, DEPTH_ONCE)
 ROUNDING_M = 0.0015
 """Readings that differ less are the same, written twice [m]."""
 
@@ -38,8 +43,8 @@ class Sample:
     """Its number in the recording."""
     image: Float[ndarray, "4 106 128"]
     """The network's input."""
-    size: tuple[int, int]
-    """Width and height of the frame [px]."""
+    frame: Frame
+    """The frame itself."""
     truth: UInt8[ndarray, "106 128"] | None = None
     """True labels."""
     mask: UInt8[ndarray, "106 128"] | None = None
@@ -57,13 +62,22 @@ class Sample:
         """Whether the frame has colour."""
         return bool(self.image[:3].any())
 
-    def shown(self, modality: str) -> Float[ndarray, "4 106 128"]:
-        """The input with or without its colour."""
-        if modality == RGBD:
-            return self.image
-        bare = self.image.copy()
-        bare[:3] = 0.0
-        return bare
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the frame [px]."""
+        return self.frame.camera.width, self.frame.camera.height
+
+    def labels_by(self, network: NetworkSegmenter, modality: str) -> UInt8[ndarray, "106 128"]:
+        """What a network says, at its size; bars have any label."""
+        bare = modality in (DEPTH, DEPTH_ONCE)
+        if modality in (RGBD, DEPTH):
+            frame = replace(self.frame, color=None) if bare else self.frame
+            return labels_to_network(ImageSegmenter(network).segment(frame))
+        image = self.image
+        if bare:
+            image = image.copy()
+            image[:3] = 0.0
+        return labels_of(network.logits_of(image))
 
 
 def samples(case: Case, numbers: Sequence[int] | None = None) -> Iterator[Sample]:
@@ -100,8 +114,7 @@ def _sample(
     seen = joints[number] if number < len(joints) else {}
     if truth is None and mask is None and not seen:
         return None
-    size = (recording.camera.width, recording.camera.height)
-    return Sample(number, image, size, truth, mask, seen)
+    return Sample(number, image, frame, truth, mask, seen)
 
 
 def _truth(frame: Frame, bare: Frame | None) -> UInt8[ndarray, "106 128"] | None:

@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-from kintrack.bench.segmentation.cases import CLEAN, COMPOSITES, CONDITIONS, TEST
+from kintrack.bench.cases import CLEAN
+from kintrack.bench.segmentation.cases import COMPOSITES, CONDITIONS, TEST
 from kintrack.bench.segmentation.runtimes import VARIANTS
-from kintrack.bench.segmentation.samples import DEPTH, RGBD
+from kintrack.bench.segmentation.samples import DEPTH, MODALITIES, RGBD
 from kintrack.bench.segmentation.summary import OBJECTS
 from segmentation.labels import LABELS
 
@@ -64,8 +65,8 @@ def counts(content: dict[str, Any]) -> Grid:
 
 def times(content: dict[str, Any]) -> Grid:
     """Milliseconds and agreement of every runtime."""
-    header = ("network", "runtime", "network alone [ms]", "p95", "with pre- and post-processing "
-              "[ms]", "p95", "pixels that differ [%]", "non-background IoU [%]",
+    header = ("network", "runtime", "network alone [ms]", "p95", "while tracking [ms]", "p95",
+              "both looks [ms]", "p95", "pixels that differ [%]", "non-background IoU [%]",
               "change")  # fmt: skip
     rows = []
     for name, found in _ordered(content, content["runtimes"]):
@@ -81,7 +82,7 @@ def times(content: dict[str, Any]) -> Grid:
                 (
                     name,
                     runtime,
-                    *(f"{took[part][key]:.1f}" for part in ("network", "whole")
+                    *(f"{took[part][key]:.1f}" for part in ("network", "tracking", "start")
                       for key in ("median_ms", "p95_ms")),
                     f"{100 * one['agreement']['differing']:.2f}",
                     _percent(iou),
@@ -141,16 +142,16 @@ def _changes(content: dict[str, Any], bare: str, full: str) -> Iterator[tuple[st
 
 def composites(content: dict[str, Any]) -> Grid:
     """Real people in real scenes."""
-    header = ("network", "object", "frames", "non-background IoU", "unknown as background",
+    header = ("network", "input", "object", "frames", "non-background IoU", "unknown as background",
               "background IoU", "person's mask IoU", *(part.replace("_", " ") for part in PARTS),
               "person unknown")  # fmt: skip
     keys = ("non_background_iou", "strict_non_background_iou", "background_iou", "person_iou",
             *PARTS, "unknown")  # fmt: skip
     rows = [
-        (network, condition, str(found["frames"]), *(_percent(found[key]) for key in keys))
-        for (network, _, condition), found in _each(content, COMPOSITES)
+        (*where, str(found["frames"]), *(_percent(found[key]) for key in keys))
+        for where, found in _each(content, COMPOSITES)
     ]
-    return Grid("UTD-MHAD in real scenes, depth only [%]", header, rows)
+    return Grid("UTD-MHAD in real scenes [%]", header, rows)
 
 
 def mask(content: dict[str, Any]) -> Grid:
@@ -161,7 +162,7 @@ def mask(content: dict[str, Any]) -> Grid:
          _percent(found["iou_read"]))
         for scene, networks in content["mask"].items()
         for name, modalities in _ordered(content, networks)
-        for modality, found in modalities.items()
+        for modality, found in _in_order(modalities)
     ]  # fmt: skip
     return Grid("Person's mask on a real recording [%]", header, rows)
 
@@ -175,7 +176,7 @@ def witness(content: dict[str, Any]) -> Grid:
     rows = []
     for scene, networks in content["witness"].items():
         for name, modalities in _ordered(content, networks):
-            for modality, found in modalities.items():
+            for modality, found in _in_order(modalities):
                 rows.append((scene, name, modality, found))
     rows.append(("synthetic", "true labels, true joints", "-", content["ceiling"]))
     return Grid(
@@ -232,7 +233,7 @@ def _each(
 ) -> Iterator[tuple[tuple[str, str, str], dict[str, Any]]]:
     """(network, input, object) and scores, in the order of the tables."""
     for network, modalities in _ordered(content, content["labels"].get(group, {})):
-        for modality, conditions in sorted(modalities.items(), key=lambda one: one[0] == DEPTH):
+        for modality, conditions in _in_order(modalities):
             for condition in (*CONDITIONS, OBJECTS):
                 if condition in conditions:
                     shown = "none" if condition == CLEAN else condition
@@ -242,6 +243,11 @@ def _each(
 def _ordered(content: dict[str, Any], by_network: dict[str, Any]) -> list[tuple[str, Any]]:
     """Networks in the order they were given, which a JSON file does not keep."""
     return [(name, by_network[name]) for name in content["order"] if name in by_network]
+
+
+def _in_order(modalities: dict[str, Any]) -> list[tuple[str, Any]]:
+    """The same for what networks are shown."""
+    return [(modality, modalities[modality]) for modality in MODALITIES if modality in modalities]
 
 
 def _percent(share: float | None) -> str:

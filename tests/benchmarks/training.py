@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Train the weights that ship, or every network that the tables compare, with one command.
+
+Data are made, networks trained one after the other in out/training/; a stopped run goes on.
+
+    python tests/benchmarks/training.py ship
+    python tests/benchmarks/training.py compare --steps 20000
+
+`compare` trains Fast-FCN, U-Net and VGG-FCN, Fast-FCN without inserted objects, and Fast-FCN with
+other weights of the background modifier, all on the same data and for as many steps, and writes
+docs/results.md. What validates are people whom training does not see.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import report
+from command import DATA, OUT, run
+from matplotlib.figure import Figure
+
+from kintrack.errors import DatasetError, ResultError
+from kintrack.result import write_atomically
+from segmentation.curves import LOG_FILE, read_log
+from segmentation.train import WEIGHTS_FILE
+from segmentation.weights import load_weights
+
+FOLDER = OUT / "training"
+PAPER_FRAMES, PAPER_PARTS = 120, ("paper/train", "paper/objects")
+FULL_FRAMES, QUICK_FRAMES = 12_000, 60
+SHIPPED = "fast_fcn"
+WIDTHS = {
+    "fast_fcn": "32 64 192 512",
+    "unet": "64 128 256 512 1024",
+    "vgg_fcn": "64 128 256 512 512",
+}
+QUICK_WIDTHS = {"fast_fcn": "4 4 8 8", "unet": "4 4 8 8 8", "vgg_fcn": "4 4 8 8 8"}
+LAMBDAS = (0.0, 0.25, 1.0)
+"""Weights of the background modifier, beside the usual 0.5."""
+FIGURE = "training.png"
+COLUMNS = ("pixel_accuracy", "background_iou", "non_background_iou", "person_iou", "mean_part_iou")
+
+
+class Recipe(NamedTuple):
+    """One training."""
+
+    name: str
+    """Folder of the run."""
+    architecture: str
+    """Which network."""
+    options: tuple[str, ...] = ()
+    """What is unlike the others."""
+
+
+COMPARED = (
+    Recipe("fast_fcn", "fast_fcn"),
+    Recipe("unet", "unet"),
+    Recipe("vgg_fcn", "vgg_fcn"),
+    Recipe("without_objects", "fast_fcn", ("--augment.inserted", "0")),
+    *(Recipe(f"lambda_{weight:g}", "fast_fcn", ("--background-weight", f"{weight:g}"))
+      for weight in LAMBDAS),
+)  # fmt: skip
+
+
+def main() -> int:
+    """Make data, train, tell."""
+    arguments = _arguments()
+    folder = FOLDER.with_name("training_quick") if arguments.quick else FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    frames = QUICK_FRAMES if arguments.quick else arguments.frames
+    _build(folder, arguments.data, frames, arguments.quick)
+    shared = ["--batch", str(arguments.batch), "--seed", str(arguments.seed)]
+    if arguments.what == "ship":
+        length = ["--steps", "4"] if arguments.quick else ["--hours", str(arguments.hours)]
+        made = _train(folder, Recipe("ship", SHIPPED), [*shared, *length], arguments.quick)
+        print(f"written: {made}")
+        return 0
+    steps = 4 if arguments.quick else arguments.steps
+    files = {
+        recipe.name: _train(folder, recipe, [*shared, "--steps", str(steps)], arguments.quick)
+        for recipe in COMPARED
+    }
+    pairs = " ".join(f"{name}={path}" for name, path in files.items() if "lambda" not in name)
+    print(f"the tables: python tests/benchmarks/part_segmentation.py --weights {pairs}")
+    if not arguments.quick:
+        figure = _figure({name: path.with_name(LOG_FILE) for name, path in files.items()})
+        write_atomically(report.RESULTS.with_name(FIGURE), lambda f: figure.savefig(f, dpi=150))
+        report.rewrite_section(report.RESULTS, "training", _section(files, steps, arguments.seed))
+        print(f"written: {report.RESULTS.relative_to(report.ROOT)}")
+    return 0
+
+
+def _arguments() -> argparse.Namespace:
+    made = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    made.add_argument("what", choices=("ship", "compare"))
+    made.add_argument("--data", type=Path, default=DATA, help="folder with mocap/")
+    made.add_argument("--frames", type=int, default=FULL_FRAMES, help="of the recipe `training`")
+    made.add_argument("--hours", type=float, default=2.5, help="length of `ship`")
+    made.add_argument("--steps", type=int, default=20_000, help="length of each of `compare`")
+    made.add_argument("--batch", type=int, default=16)
+    made.add_argument("--seed", type=int, default=0)
+    made.add_argument("--quick", action="store_true", help="tiny networks; docs/ is left as it is")
+    found = made.parse_args()
+    if found.what == "compare" and found.steps < 1:
+        raise ResultError(f"--steps {found.steps}: at least 1 is needed")
+    return found
+
+
+def _build(folder: Path, data: Path, frames: int, quick: bool) -> None:
+    """Both sets, or what is missing of them."""
+    mocap = data / "mocap"
+    if not mocap.is_dir():
+        raise DatasetError(f"{mocap} is no folder: motion capture clips are needed there")
+    _kintrack(folder, "dataset", "build", "training", "--recipe", "training", "--mocap",
+              str(mocap), "--frames", str(frames))  # fmt: skip
+    if not quick:
+        _kintrack(folder, "dataset", "build", "paper", "--recipe", "paper", "--mocap", str(mocap),
+                  "--frames", str(PAPER_FRAMES))  # fmt: skip
+
+
+def _train(folder: Path, recipe: Recipe, options: Sequence[str], quick: bool) -> Path:
+    """Weights of a run, which goes on where it was stopped."""
+    path = folder / recipe.name / WEIGHTS_FILE
+    widths = (QUICK_WIDTHS if quick else WIDTHS)[recipe.architecture]
+    if not path.is_file():
+        less = ["--bank.cutouts", "4", "--bank.rooms", "2"] if quick else []
+        _kintrack(
+            folder, "train", "training", *(() if quick else PAPER_PARTS), "-o", recipe.name,
+            "--cache", "cache", "--network.architecture", recipe.architecture,
+            "--network.widths", *widths.split(), *options, *recipe.options, *less,
+        )  # fmt: skip
+    return path
+
+
+def _kintrack(folder: Path, *words: str) -> None:
+    """Run a command in a folder, so that weights files tell no paths beyond it."""
+    command = Path(sys.executable).with_name("kintrack")
+    done = subprocess.run([str(command), *words], cwd=folder, check=False)
+    if done.returncode == 130:
+        raise KeyboardInterrupt
+    if done.returncode:
+        raise ResultError(f"kintrack {' '.join(words)} ended with code {done.returncode}")
+
+
+def _section(files: dict[str, Path], steps: int, seed: int) -> str:
+    """Markdown of the section."""
+    facts: dict[str, Any] = {name: load_weights(path).training for name, path in files.items()}
+    rows = [
+        [name.replace("_", " "), f"{said['config']['background_weight']:g}",
+         f"{said['config']['augment']['inserted']:g}", f"{said['hours']:.2f}",
+         *(f"{100 * said['validation'][key]:.1f}" for key in COLUMNS)]
+        for name, said in facts.items()
+    ]  # fmt: skip
+    header = ["run", "lambda", "objects inserted", "hours", *(c.replace("_", " ") for c in COLUMNS)]
+    first = next(iter(facts.values()))
+    told = report.conditions(
+        data=f"{', '.join(first['data'])}: {first['training_pictures']} pictures train, "
+        f"{first['validation_pictures']} of other people validate",
+        seeds=str(seed),
+    )
+    return f"""## Training
+
+All networks on the same data for {steps} steps, scores [%] on people whom training does not see.
+
+{report.table(header, rows)}
+
+![loss and validation over steps]({FIGURE})
+
+### Conditions
+
+{report.bullets(told)}
+"""
+
+
+def _figure(logs: dict[str, Path]) -> Figure:
+    """Loss and validation of every run."""
+    figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+    loss, score = figure.subplots(1, 2)
+    for name, path in logs.items():
+        entries = read_log(path)
+        losses = [(e["step"], e["loss"]) for e in entries if "loss" in e]
+        scores = [(e["step"], 100 * e["validation"]["non_background_iou"])
+                  for e in entries if "validation" in e]  # fmt: skip
+        loss.plot(*zip(*losses, strict=True), lw=0.8, label=name)
+        score.plot(*zip(*scores, strict=True), lw=1.2, label=name)
+    loss.set(xlabel="step", ylabel="training loss", yscale="log")
+    score.set(xlabel="step", ylabel="non-background IoU of validation [%]")
+    for axis in (loss, score):
+        axis.grid(alpha=0.3)
+    score.legend(fontsize=7)
+    return figure
+
+
+if __name__ == "__main__":
+    run(main)
