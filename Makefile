@@ -26,7 +26,6 @@ demo: $(RUN)  ## fit the recording that ships; page, video and scores in kintrac
 	else $(KINTRACK) demo --no-open && echo "no display: open kintrack-demo/track.html in a browser"; fi
 
 test: lint  ## format, lint and type checks, then all tests
-	KINTRACK_ALONE=1 $(PY) -m pytest tests/bench/test_segmentation_command.py
 	$(PY) -m pytest
 
 lint: $(DEV)  ## format, lint and type checks

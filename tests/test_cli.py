@@ -1,29 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
+import inspect
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from kintrack.cli import main
+from kintrack.cli import COMMANDS, command, main
 from kintrack.tracker import Tracker
 
 ROOT = Path(__file__).resolve().parents[1]
 DEMO = ROOT / "src" / "kintrack" / "demo"
-COMMANDS = (
-    "fit",
-    "view",
-    "evaluate",
-    "demo",
-    "label",
-    "occlude",
-    "dataset",
-    "train",
-    "bench",
-    "model",
-)
+HEAVY = {"torch", "pinocchio", "numba", "openvino", "cv2", "trimesh", "embreex"}
 QUICK = ["--config.start.shape-coefficients", "0", "--config.start.rounds", "6"]
 
 
@@ -245,7 +237,29 @@ def test_help_lists_the_commands(capsys):
         main(["--help"])
     assert ended.value.code == 0
     text = capsys.readouterr().out
-    assert all(command in text for command in COMMANDS)
+    assert all(name in text for name in COMMANDS)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_says_of_a_command_what_the_command_says_of_itself(name):
+    assert COMMANDS[name] == inspect.getdoc(command(name))
+
+
+@pytest.mark.parametrize(
+    "words", [["--help"], ["fit", "--help"], ["calibrate", "--help"]], ids=" ".join
+)
+def test_help_waits_for_none_of_the_heavy_packages(words):
+    program = (
+        "import sys\n"
+        "from kintrack.cli import main\n"
+        "try:\n"
+        f"    main({words})\n"
+        "finally:\n"
+        f"    sys.stderr.write(' '.join(sys.modules.keys() & {HEAVY}))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0 and "usage: kintrack" in done.stdout
+    assert not done.stderr
 
 
 def test_interrupting_ends_with_130_and_a_valid_result(recording, capsys, monkeypatch):

@@ -17,7 +17,7 @@ FIELDS = [
     (section, field)
     for section in SECTIONS
     for field in dataclasses.fields(section)
-    if not isinstance(field.default, str)
+    if not isinstance(field.default, str | bool)
 ]
 NAMES = [f"{section.__name__}.{field.name}" for section, field in FIELDS]
 every_field = pytest.mark.parametrize(("section", "field"), FIELDS, ids=NAMES)

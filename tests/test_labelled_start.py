@@ -9,8 +9,9 @@ from kintrack.errors import ConfigError
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA as T
 from kintrack.human import ARMS_OUT_DEG, SITTING_DEG
 from kintrack.joints import JOINT_NAMES
+from kintrack.labelled_config import LabelledStartConfig
 from kintrack.sides import OTHER_SIDE
-from kintrack.start import LabelledStartConfig, start_from_labels
+from kintrack.start import start_from_labels
 from kintrack.start.evidence import evidence_of
 from kintrack.start.placing import guesses
 from kintrack.start.postures import ARMS_DEG, LEGS_DEG, TRUNKS_DEG, postures_of

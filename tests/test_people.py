@@ -7,7 +7,8 @@ import pytest
 from kintrack.errors import ConfigError
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA as T
 from kintrack.joints import JOINT_NAMES
-from kintrack.people import PeopleConfig, choose, find_people, only
+from kintrack.labelled_config import PeopleConfig
+from kintrack.people import choose, find_people, only
 from labelled_people import board, labelled, world_joints
 
 CHEST = JOINT_NAMES.index("chest")

@@ -10,7 +10,7 @@ from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_poin
 from kintrack.joints import JOINT_NAMES
 from kintrack.raster import rasterise
 from kintrack.skin import skinned_vertices
-from kintrack.start import start
+from kintrack.start import found_by
 from kintrack.tracker import Tracker
 
 LEFT_ARM = [JOINT_NAMES.index(f"l_{name}") for name in ("elbow", "wrist", "hand")]
@@ -231,7 +231,7 @@ def test_after_a_rejected_start_the_next_attempt_waits(scene, monkeypatch):
     depth[60:200, 110:210] = 2.5
     attempts = []
     monkeypatch.setattr(
-        "kintrack.tracker.start", lambda *given: attempts.append(0) or start(*given)
+        "kintrack.tracker.found_by", lambda *given: attempts.append(0) or found_by(*given)
     )
     tracker = Tracker()
     times = [0.0, 0.1, 0.4, 0.6, 0.7]

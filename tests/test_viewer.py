@@ -191,7 +191,8 @@ def test_a_replay_shows_each_frame_with_the_body_that_was_tracked(tmp_path):
     write_track(tmp_path, 3)
     viewer = Witness()
     replay(tmp_path, Recording(3), viewer, BODY, SKIN, fps=1000)
-    frames, vertices, joints, statuses, texts = zip(*viewer.shown, strict=True)
+    frames, vertices, joints, statuses, texts, colors = zip(*viewer.shown, strict=True)
+    assert colors == (None,) * len(frames)
     assert [frame.index for frame in frames] == [0, 1, 2]
     assert statuses == ("tracking", "lost", "tracking")
     assert vertices[1] is None

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from kintrack.body import Body
-from kintrack.config import MotionConfig
+from kintrack.body import Body, BodyState, run_kinematics
+from kintrack.config import MotionConfig, TrackerConfig
 from kintrack.human import motion_sigma
-from kintrack.residuals.prior import TangentPrior, diagonal_prior
+from kintrack.residuals.prior import TangentPrior, diagonal_prior, gaussian_prior
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,15 @@ def predict(
     q[7:][hinges] += back * (belief.habit[6:] - q[7:])[hinges]
     q[7:] = np.clip(q[7:], body.lower[6:], body.upper[6:])
     return q
+
+
+def awaited_state(
+    body: Body, belief: Belief | None, timestamp_s: float, motion: MotionConfig
+) -> BodyState | None:
+    """The body as it is predicted; None if nobody is tracked."""
+    if belief is None:
+        return None
+    return run_kinematics(body, predict(body, belief, timestamp_s, motion))
 
 
 def spread(
@@ -167,3 +176,33 @@ def coasted(
 def _angles(q: Float[ndarray, " nq"]) -> Float[ndarray, " nv"]:
     """Hinge angles in the order of the tangent space, 0 for the root."""
     return np.concatenate([np.zeros(6), q[7:]])
+
+
+def tracking_priors(
+    awaited: BodyState,
+    belief: Belief,
+    resting: Float[ndarray, " nq"],
+    rest_sigma: Float[ndarray, " nv"],
+    unseen: Bool[ndarray, " nv"],
+    hidden: Bool[ndarray, " nv"],
+    timestamp_s: float,
+    config: TrackerConfig,
+) -> list[TangentPrior]:
+    """What is known of a tracked body before its pixels are asked: its motion, and rest.
+
+    Args:
+        awaited: The body as it is predicted.
+        belief: The last one.
+        resting: Resting pose.
+        rest_sigma: Standard deviation of every hinge about it [rad].
+        unseen: Hinges of which hardly any skin is found where it is expected.
+        hidden: Hinges that are hidden.
+        timestamp_s: Now [s].
+        config: Motion and times.
+    """
+    surely = spread(awaited.body, belief, hidden, timestamp_s, config.motion, rest_sigma)
+    share = config.prior.unseen_s / belief.step_s(timestamp_s)
+    return [
+        gaussian_prior(awaited.q, surely),
+        rest_prior(resting, rest_sigma, unseen, hidden, share),
+    ]

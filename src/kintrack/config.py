@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, fields
 
+from kintrack.deformation_config import DeformationConfig
 from kintrack.errors import ConfigError
 
 
@@ -320,3 +321,5 @@ class TrackerConfig:
     """First start."""
     judge: JudgeConfig = field(default_factory=JudgeConfig)
     """Status."""
+    deformation: DeformationConfig = field(default_factory=DeformationConfig)
+    """Surface of the clothes."""

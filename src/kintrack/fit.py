@@ -14,6 +14,8 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.body import run_kinematics
+from kintrack.calibration.acquaintance import Acquaintance, Again, Watched
+from kintrack.calibration.config import BodyConfig
 from kintrack.calibration.person import Person, dressed_human, human_of
 from kintrack.config import TrackerConfig
 from kintrack.errors import ResultError
@@ -22,7 +24,7 @@ from kintrack.export.overlay import depth_range
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
 from kintrack.human import Human, load_human
 from kintrack.joints import JOINT_NAMES
-from kintrack.person import LabelledConfig
+from kintrack.labelled_config import LabelledConfig
 from kintrack.result import FrameResult, Track, TrackWriter, make_result_folder
 from kintrack.segmenter import Segmenter
 from kintrack.sequence.frame import Frame, SequenceReader
@@ -56,8 +58,14 @@ def fit_sequence(
     segmenter: Segmenter | None = None,
     person: Person | None = None,
     labelled: LabelledConfig | None = None,
+    body: BodyConfig | None = None,
 ) -> Track:
     """Track a recording into a result folder that is valid at every moment.
+
+    Unless the person is given or `body` says otherwise, she is calibrated after the first second
+    of tracking, and the recording is tracked from its beginning with her body, so that a result has
+    one body throughout. If that follows her worse than before, or she is in doubt, the template
+    stays.
 
     Args:
         sequence: The recording.
@@ -66,33 +74,68 @@ def fit_sequence(
         outputs: Video and page, if wanted.
         viewer: Shown every frame, if given.
         T_world_camera: Camera pose; a level camera if not given.
-        on_frame: Called after every frame, for progress.
+        on_frame: Called after every frame, for progress; frames tracked again come again.
         begun: A frame, and the joints in it as far as they are known (`Tracker.begin`), with which
             the tracker starts before the first frame; it starts by itself if None.
         segmenter: Labels every frame; None for the geometry alone.
-        person: Who it is; if None, or if the template stands in for him, the average adult, sized
-            at the start.
+        person: Who it is; if None, she is calibrated while tracking. The template that stands in
+            for somebody in doubt is sized at the start.
         labelled: What belongs to labels; the defaults if None.
+        body: Which body; the defaults if None.
 
     Returns:
         The track; also written when an exception or Ctrl-C ends the loop.
 
     Raises:
         ResultError: if an output cannot be written, before any work.
+        CalibrationError: if a person or height is given that `body` has no use for, or nobody is as
+            tall as stated.
     """
+    body = BodyConfig() if body is None else body
     outputs = Outputs() if outputs is None else outputs
-    viewer = NullViewer() if viewer is None else viewer
     for path in (outputs.video, outputs.html):
         if path is not None:
             make_result_folder(path.parent)
-    human = None if person is None or person.is_template else human_of(person)
-    worn = {} if human is None or person is None else person.clothing_m
-    tracker = Tracker(config, human, T_world_camera, segmenter=segmenter, labelled=labelled)
+    config = body.applied(TrackerConfig() if config is None else config)
+    acquaintance = Acquaintance(body, person, T_world_camera, config)
+    watched = None if segmenter is None else Watched(segmenter)
+    while True:
+        who = acquaintance.person
+        human = None if who is None else human_of(who)
+        tracker = Tracker(config, human, T_world_camera, segmenter=watched, labelled=labelled)
+        try:
+            return _pass(
+                sequence,
+                folder,
+                tracker,
+                acquaintance,
+                watched,
+                outputs,
+                NullViewer() if viewer is None else viewer,
+                on_frame,
+                begun,
+            )
+        except Again:
+            continue
+
+
+def _pass(
+    sequence: SequenceReader,
+    folder: Path,
+    tracker: Tracker,
+    acquaintance: Acquaintance,
+    watched: Watched | None,
+    outputs: Outputs,
+    viewer: Viewer,
+    on_frame: Callable[[Frame, FrameResult], None],
+    begun: tuple[Frame, Float[ndarray, "j 3"]] | None,
+) -> Track:
+    """Track from the first frame to the last, or until another body should be tried (`Again`)."""
     if begun is not None:
         tracker.begin(*begun)
-    facts = asdict(tracker.config)
-    if segmenter is not None:
-        facts |= {"labelled": asdict(tracker.labelled), "segmenter": segmenter.name}
+    T_world_camera, facts = tracker.T_world_camera, asdict(tracker.config)
+    if watched is not None:
+        facts |= {"labelled": asdict(tracker.labelled), "segmenter": watched.name}
     with ExitStack() as stack:
         writer = stack.enter_context(
             TrackWriter(
@@ -103,7 +146,7 @@ def fit_sequence(
                 config=facts,
             )
         )
-        writer.note(T_world_camera=T_world_camera)
+        writer.note(T_world_camera=T_world_camera, body=acquaintance.told())
         video = outputs.video and stack.enter_context(VideoWriter(outputs.video, _rate(sequence)))
         page = None
         if outputs.html is not None:
@@ -113,6 +156,7 @@ def fit_sequence(
         for frame in sequence:
             result = tracker.step(frame)
             writer.append(result)
+            worn = acquaintance.clothing_m
             writer.note(person={"shape": tracker.human.shape, "clothing_m": worn})
             vertices = posed_skin(tracker.human, result.q, T_world_camera)
             joints = result.joint_positions_camera_m
@@ -136,6 +180,11 @@ def fit_sequence(
                     )
                 )
             on_frame(frame, result)
+            labels = None if watched is None else watched.last
+            acquaintance.see(frame, result, tracker.human, labels)
+            writer.note(body=acquaintance.told())
+        acquaintance.conclude()
+        writer.note(body=acquaintance.told())
         return writer.close()
 
 

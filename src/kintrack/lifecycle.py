@@ -13,59 +13,13 @@ given up sooner. Nobody in view is a reason, not an error.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
-from kintrack.config import check_bounds
+from kintrack.labelled_config import LifecycleConfig, Limits
 
 NOBODY = "nobody in view"
 HIDDEN = "hardly anything of the person is seen"
 SOMEBODY_ELSE = "somebody else is in view; the lost person may still be hidden"
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a frame must satisfy; labels count only where there are some."""
-
-    max_rms_m: float
-    """Largest surface residual [m]."""
-    min_explained: float
-    """Least share of the person's points near the skin."""
-    min_supported: float
-    """Least share of the skin that should be seen and has a point near it."""
-    min_labels: float
-    """Least share of skin seen on the person whose label is the pixel's."""
-
-    def __post_init__(self) -> None:
-        check_bounds(
-            self,
-            max_rms_m=(1e-3, 1),
-            min_explained=(0, 1),
-            min_supported=(0, 1),
-            min_labels=(0, 1),
-        )
-
-
-@dataclass(frozen=True)
-class LifecycleConfig:
-    """When tracking begins and ends."""
-
-    begin: Limits = field(default_factory=lambda: Limits(0.025, 0.7, 0.45, 0.55))
-    """What a first pose must satisfy."""
-    stay: Limits = field(default_factory=lambda: Limits(0.03, 0.5, 0.25, 0.35))
-    """What every further frame must satisfy."""
-    patience: int = 6
-    """Bad frames in a row that end a track."""
-    young: int = 10
-    """A track with fewer good frames than this is young."""
-    young_patience: int = 3
-    """Bad frames in a row that end a young track."""
-    retry: int = 2
-    """After a first pose was rejected, so many frames pass before the next is tried."""
-
-    def __post_init__(self) -> None:
-        check_bounds(
-            self, patience=(1, 1000), young=(0, 1000), young_patience=(1, 1000), retry=(0, 1000)
-        )
 
 
 @dataclass(frozen=True)

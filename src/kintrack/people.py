@@ -19,57 +19,10 @@ from scipy.spatial.distance import cdist
 
 from kintrack.association.observation import Observation
 from kintrack.components import components
-from kintrack.config import check_bounds
 from kintrack.geometry import LABELS, transform_points
+from kintrack.labelled_config import PeopleConfig
 
 HEAD, TORSO = LABELS.index("head"), LABELS.index("torso")
-
-
-@dataclass(frozen=True)
-class PeopleConfig:
-    """What parts people and what joins them."""
-
-    edge_m: float = 0.12
-    """Depth step between neighbouring pixels that parts two pieces [m]."""
-    link_m: float = 0.2
-    """Pieces this near to each other are one person [m]."""
-    aside_m: float = 0.2
-    """Pieces above each other may be one person if no further aside than this [m]."""
-    above_m: float = 0.9
-    """And if the gap between them is no higher than this [m]."""
-    least_piece_m2: float = 0.002
-    """Smaller pieces are ignored [m^2]."""
-    least_core: float = 0.12
-    """Pieces of which a smaller share has labelled neighbours at its own depth are ignored."""
-    least_person_m2: float = 0.04
-    """People who show less are ignored [m^2]."""
-    head_m2: float = 0.008
-    """A piece that shows this much head has one [m^2]."""
-    torso_m2: float = 0.05
-    """A piece that shows this much trunk has one [m^2]."""
-    heads_m: float = 0.35
-    """Heads further apart than this are two [m]."""
-    torsos_m: float = 0.6
-    """Trunks whose middles are further apart than this are two [m]."""
-    max_distance_m: float = 8.0
-    """Pixels further away are ignored [m]."""
-
-    def __post_init__(self) -> None:
-        check_bounds(
-            self,
-            edge_m=(0.01, 1),
-            link_m=(0.01, 2),
-            aside_m=(0, 2),
-            above_m=(0, 2),
-            least_piece_m2=(0, 1),
-            least_core=(0, 1),
-            least_person_m2=(0, 1),
-            head_m2=(1e-4, 1),
-            torso_m2=(1e-4, 1),
-            heads_m=(0, 2),
-            torsos_m=(0, 2),
-            max_distance_m=(0.3, 30),
-        )
 
 
 @dataclass(frozen=True)

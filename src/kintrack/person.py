@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -12,24 +12,11 @@ from numpy import ndarray
 from kintrack.association.observation import Observation
 from kintrack.config import JudgeConfig, PullConfig
 from kintrack.geometry import transform_points
-from kintrack.lifecycle import LifecycleConfig, Limits
+from kintrack.labelled_config import LabelledConfig, LifecycleConfig, Limits
 from kintrack.people import find_people, only
 from kintrack.residuals.targets import TargetResidual
-from kintrack.start import LabelledStartConfig
 from kintrack.targets import find_targets
-from kintrack.whereabouts import Whereabouts, WhereaboutsConfig, follow, mine, seek
-
-
-@dataclass(frozen=True)
-class LabelledConfig:
-    """What only a labelled image can be asked."""
-
-    lifecycle: LifecycleConfig = field(default_factory=LifecycleConfig)
-    """When tracking begins and ends."""
-    start: LabelledStartConfig = field(default_factory=LabelledStartConfig)
-    """Starts and who is a person."""
-    whereabouts: WhereaboutsConfig = field(default_factory=WhereaboutsConfig)
-    """Who is who."""
+from kintrack.whereabouts import Whereabouts, follow, mine, seek
 
 
 def geometric_lifecycle(judge: JudgeConfig) -> LifecycleConfig:

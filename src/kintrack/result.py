@@ -12,7 +12,7 @@ import time
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
@@ -24,6 +24,7 @@ from numpy import ndarray
 from kintrack import __version__
 from kintrack.errors import ResultError
 from kintrack.geometry import PinholeCamera
+from kintrack.offsets import SURFACE_FILE, packed, save_offsets
 
 STATUSES = ("initialising", "tracking", "lost", "skipped")
 TRACK_FILE = "track.npz"
@@ -56,6 +57,8 @@ class FrameResult:
     """Why the frame was skipped; None for any other status."""
     iterations: int = 0
     """Solver iterations spent."""
+    offsets_m: Float[ndarray, " v"] | None = None
+    """Offset of every vertex of the tracking skin along its normal [m]; None without a surface."""
 
 
 @dataclass(frozen=True)
@@ -306,7 +309,9 @@ class TrackWriter:
         }
         self._flush_every_s = flush_every_s
         self._frames: list[FrameResult] = []
+        self._offsets: list[ndarray] = []
         self._write(finished=False)
+        (self.folder / SURFACE_FILE).unlink(missing_ok=True)
 
     def append(self, frame: FrameResult) -> None:
         """Take one frame; now and then, write all so far.
@@ -314,7 +319,8 @@ class TrackWriter:
         Raises:
             ResultError: if a write is due and fails.
         """
-        self._frames.append(frame)
+        self._offsets.append(packed(frame.offsets_m))
+        self._frames.append(replace(frame, offsets_m=None))
         if time.monotonic() - self._written_at_s >= self._flush_every_s:
             self._write(finished=False)
 
@@ -328,6 +334,10 @@ class TrackWriter:
         Raises:
             ResultError: if the folder cannot be written.
         """
+        if any(map(len, self._offsets)):
+            write_atomically(
+                self.folder / SURFACE_FILE, lambda file: save_offsets(file, self._offsets)
+            )
         return self._write(finished)
 
     def __enter__(self) -> TrackWriter:

@@ -20,20 +20,10 @@ from jaxtyping import Float, Int
 from numba import njit
 from numpy import ndarray
 
-from kintrack.body import (
-    FRAME_OF_JOINT,
-    Body,
-    BodyState,
-    Rig,
-    load_body,
-    load_rig,
-    model_folder,
-    read_arrays,
-    rigged_body,
-    shape_coefficients,
-)
+from kintrack.body import FRAME_OF_JOINT, Body, BodyState, load_body, rigged_body
 from kintrack.geometry import invert_rigid
 from kintrack.joints import JOINT_NAMES
+from kintrack.rig import Rig, load_rig, model_folder, read_arrays, shape_coefficients
 from kintrack.skin import Skin, load_skin
 
 

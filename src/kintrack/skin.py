@@ -15,9 +15,10 @@ from jaxtyping import Float, Int, UInt8
 from numba import njit
 from numpy import ndarray
 
-from kintrack.body import BodyState, load_rig, model_folder, read_arrays, shape_coefficients
+from kintrack.body import BodyState
 from kintrack.errors import ModelError
 from kintrack.geometry import invert_rigid
+from kintrack.rig import load_rig, model_folder, read_arrays, shape_coefficients
 
 
 @dataclass(frozen=True)

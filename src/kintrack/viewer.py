@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from kintrack.body import Body, run_kinematics
+from kintrack.deformation.relief import relief_of
 from kintrack.errors import ResultError
+from kintrack.export.coloring import colors_of
 from kintrack.export.packing import assemble_page, pack_frame, pack_scene
 from kintrack.export.server import CONNECT_LIVE, PageServer
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, PinholeCamera, invert_rigid, transform_points
@@ -36,6 +38,7 @@ class Viewer(Protocol):
         joint_positions_camera: Float[ndarray, "j 3"] | None,
         status: str,
         text: str = "",
+        vertex_colors: UInt8[ndarray, "v 3"] | None = None,
     ) -> None:
         """Show one frame; returns at once.
 
@@ -46,6 +49,7 @@ class Viewer(Protocol):
                 hides them.
             status: One of the statuses of a `FrameResult`.
             text: Anything else worth a line.
+            vertex_colors: R G B of the skin; those of the parts if never given.
         """
         ...
 
@@ -64,6 +68,7 @@ class NullViewer:
         joint_positions_camera: Float[ndarray, "j 3"] | None,
         status: str,
         text: str = "",
+        vertex_colors: UInt8[ndarray, "v 3"] | None = None,
     ) -> None:
         """Do nothing."""
 
@@ -108,6 +113,7 @@ class MeshcatViewer:
         joint_positions_camera: Float[ndarray, "j 3"] | None,
         status: str,
         text: str = "",
+        vertex_colors: UInt8[ndarray, "v 3"] | None = None,
     ) -> None:
         """Show one frame, see `Viewer.show`."""
         T = self._T_world_camera
@@ -116,7 +122,16 @@ class MeshcatViewer:
             scene = pack_scene(self._skin, frame.camera, T, MOST_POINTS)
             self._server.begin(json.dumps(scene))
         self._server.publish(
-            pack_frame(frame, vertices_camera, joint_positions_camera, status, text, T, MOST_POINTS)
+            pack_frame(
+                frame,
+                vertices_camera,
+                joint_positions_camera,
+                status,
+                text,
+                T,
+                MOST_POINTS,
+                vertex_colors,
+            )
         )
 
     def close(self) -> None:
@@ -134,6 +149,8 @@ def replay(
     T_world_camera: Float[ndarray, "4 4"] = T_LEVEL_WORLD_CAMERA,
     fps: float | None = None,
     loop: bool = False,
+    offsets_m: Float[ndarray, "n v"] | None = None,
+    coloring: str = "part",
 ) -> None:
     """Show a written track over its recording.
 
@@ -146,6 +163,8 @@ def replay(
         T_world_camera: The depth camera's place in the world of the track's q.
         fps: Frames per second [hz]; the recording's own time stamps if None.
         loop: Start again at the end, until interrupted.
+        offsets_m: Offsets of the skin in every frame [m]; None for the skin as it is.
+        coloring: What the skin's colours mean, one of `kintrack.export.coloring.COLORINGS`.
 
     Raises:
         ResultError: if the track cannot be read, is empty, or is of another recording or body.
@@ -162,14 +181,18 @@ def replay(
     due_s = track.timestamps_s - track.timestamps_s[0]
     if fps is not None:
         due_s = np.arange(len(track)) / fps
-    T_camera_world = invert_rigid(T_world_camera)
+    T_camera_world, relief = invert_rigid(T_world_camera), relief_of(body, skin)
     for _ in count() if loop else range(1):
         started_s = time.monotonic()
         for i, frame in enumerate(islice(sequence, len(track))):
-            vertices = None
+            vertices, colors = None, None
             if np.isfinite(track.q[i]).all():
-                state = run_kinematics(body, track.q[i])
-                vertices = transform_points(T_camera_world, skinned_vertices(state, skin))
+                offsets = np.zeros(len(skin.labels)) if offsets_m is None else offsets_m[i]
+                raised = skinned_vertices(run_kinematics(body, track.q[i]), relief.raised(offsets))
+                vertices = transform_points(T_camera_world, raised)
+                if coloring != "part":
+                    colors = colors_of(coloring, skin, offsets, vertices, frame)
             time.sleep(max(0.0, started_s + due_s[i] - time.monotonic()))
             joints, status = track.joint_positions_camera_m[i], str(track.status[i])
-            viewer.show(frame, vertices, joints, status, f"{track.milliseconds[i]:.0f} ms")
+            text = f"{track.milliseconds[i]:.0f} ms"
+            viewer.show(frame, vertices, joints, status, text, colors)

@@ -14,43 +14,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.config import check_bounds
+from kintrack.labelled_config import WhereaboutsConfig
 from kintrack.people import Somebody, choose
 
 REFUSED_SHARE = 0.25
 """Instead of somebody who could not be fitted, people are tried who show this share of the most."""
-
-
-@dataclass(frozen=True)
-class WhereaboutsConfig:
-    """How far people get while nobody sees them."""
-
-    reach_m: float = 0.6
-    """A place is known this well [m]."""
-    walk_m_s: float = 1.2
-    """How fast somebody who is not seen may move away from where he is expected [m/s]."""
-    other_m_s: float = 2.0
-    """The same for the others, who are seen more often [m/s]."""
-    carry_s: float = 0.5
-    """How long a speed is carried on [s]."""
-    hold_s: float = 4.0
-    """So long after a loss nobody who may be somebody else is taken [s]."""
-    forget_s: float = 8.0
-    """Others not seen for this long are forgotten [s]."""
-    refuse_s: float = 1.0
-    """So long after somebody could not be fitted anybody else is tried first [s]."""
-
-    def __post_init__(self) -> None:
-        check_bounds(
-            self,
-            reach_m=(0.05, 10),
-            walk_m_s=(0, 20),
-            other_m_s=(0, 20),
-            carry_s=(0, 10),
-            hold_s=(0, 1e4),
-            forget_s=(0, 1e4),
-            refuse_s=(0, 1e4),
-        )
 
 
 @dataclass(frozen=True)

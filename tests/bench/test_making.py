@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from kintrack.bench import running
-from kintrack.bench.segmentation.making import MADE_FILE, Excerpt, is_made, make_all, spread
+from kintrack.bench.made import MADE_FILE, is_made
+from kintrack.bench.segmentation.making import Excerpt, make_all, spread
 from kintrack.errors import SceneError
 from kintrack.sequence.folder import open_folder
 from kintrack.sequence.occlusion import read_occlusion
@@ -71,11 +72,12 @@ def test_an_excerpt_keeps_images_joints_and_what_hides_them_in_step(tmp_path, at
 def test_an_excerpt_is_made_again_when_its_source_or_its_length_changes(tmp_path, at_once):
     job = Excerpt(record(tmp_path / "long"), tmp_path / "short", 2, labelled=True)
     made(job)
-    assert is_made(job) and made(job)[1] == [(1, 1), (1, 1)]
-    assert not is_made(Excerpt(tmp_path / "long", tmp_path / "short", 3, labelled=True))
+    assert is_made(job.folder, job.recipe()) and made(job)[1] == [(1, 1), (1, 1)]
+    longer = Excerpt(tmp_path / "long", tmp_path / "short", 3, labelled=True)
+    assert not is_made(longer.folder, longer.recipe())
     path = tmp_path / "long" / "depth" / "000001.png"
     path.write_bytes(path.read_bytes() + b"\0")
-    assert not is_made(job)
+    assert not is_made(job.folder, job.recipe())
 
 
 def test_a_folder_that_was_left_half_made_is_made_anew(tmp_path, at_once):
@@ -83,7 +85,7 @@ def test_a_folder_that_was_left_half_made_is_made_anew(tmp_path, at_once):
     made(job)
     (tmp_path / "short" / MADE_FILE).unlink()
     made(job)
-    assert is_made(job) and len(open_folder(tmp_path / "short")) == 2
+    assert is_made(job.folder, job.recipe()) and len(open_folder(tmp_path / "short")) == 2
 
 
 def test_one_thread_for_those_who_film_is_not_one_thread_for_what_is_timed(

@@ -1,19 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bench of the networks, in a process of its own: `make test` runs this file by itself.
-
-After every runtime has computed in one process, signals that tests before or after it send end that
-process with a segmentation fault in native code.
-"""
+"""The bench of the networks."""
 
 import importlib
 import json
-import os
 from pathlib import Path
 
 import pytest
 
-if not os.environ.get("KINTRACK_ALONE"):
-    pytest.skip("needs a process of its own: KINTRACK_ALONE=1", allow_module_level=True)
 pytest.importorskip("openvino")
 pytest.importorskip("embreex")
 

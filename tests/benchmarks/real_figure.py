@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from real_tables import ACTIONS
-from scoring import JOINT_KINDS, RecordingScore, pool
+from scoring import ACTIONS, JOINT_KINDS, RecordingScore, pool
 
 from kintrack.metrics import THRESHOLDS_M
 from kintrack.result import write_atomically

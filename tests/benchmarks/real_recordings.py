@@ -17,8 +17,10 @@ import baseline
 import report
 from command import OUT, parser, refuse_quick_baseline, run, settle
 from fitting import Job, fit_all
+from real_cases import what_goes_wrong
 from real_figure import write_figure
-from real_tables import metrics, section, what_goes_wrong
+from real_metrics import metrics
+from real_tables import section
 from scenes import SCENES, SceneScore, score_scene
 from scoring import JOINT_KINDS, RecordingScore, pool, score_recording
 

@@ -1,39 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The section on real recordings: targets, tables by action, person and joint, the worst ten."""
+"""The section on real recordings: targets, tables by action, person and joint, full scenes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from baseline import Metric, target_table
-from numpy import ndarray
+from baseline import target_table
+from real_cases import failures, worst
+from real_metrics import metrics
 from report import table
 from scenes import SceneScore
-from scoring import JOINT_KINDS, JOINTS, Pooled, RecordingScore, nanmean, pool
+from scoring import ACTIONS, JOINT_KINDS, Pooled, RecordingScore, pool
 from timing import LEADS
 
 from kintrack.metrics import THRESHOLDS_M
-
-ACTIONS = {
-    1: "swipe",
-    3: "wave",
-    4: "clap",
-    6: "arm cross",
-    13: "boxing",
-    16: "arm curl",
-    21: "pick up and throw",
-    22: "jog",
-    23: "walk",
-    24: "sit to stand",
-    25: "stand to sit",
-    26: "lunge",
-    27: "squat",
-}
-"""Action number -> name."""
-
-FAR_M = 0.20
-"""A joint further than this from the Kinect's is worth a word [m]."""
 
 _GROUP = (
     "",
@@ -50,68 +31,6 @@ _GROUP = (
     "away",
     "inside out",
 )
-
-
-def metrics(scores: Sequence[RecordingScore]) -> list[Metric]:
-    """The overall numbers with their targets."""
-    p = pool(scores)
-    return [
-        Metric(
-            "tracking", "frames with status `tracking`", 100 * p.tracking, "%", "higher", 0.3, 98
-        ),
-        Metric(
-            "rms",
-            "point-to-skin RMS of inliers, mean over frames",
-            1e3 * p.rms_m,
-            "mm",
-            "lower",
-            0.3,
-            15,
-        ),
-        Metric(
-            "worst_rms", "the same, worst recording", 1e3 * p.worst_rms_m, "mm", "lower", 1.0, 15
-        ),
-        Metric(
-            "distance",
-            "mean distance to the Kinect's joints",
-            100 * p.mean_m,
-            "cm",
-            "lower",
-            0.2,
-            7,
-        ),
-        Metric(
-            "offset_free",
-            "the same, constant offsets per joint and recording taken off",
-            100 * p.offset_free_m,
-            "cm",
-            "lower",
-            0.2,
-            4.5,
-        ),
-        Metric(
-            "torso_offset_free",
-            "the same, offsets that turn with the torso",
-            100 * p.torso_offset_free_m,
-            "cm",
-            "lower",
-            0.2,
-        ),
-        Metric(
-            "within_10_cm",
-            "joints within 10 cm of the Kinect's",
-            100 * float(np.interp(0.10, THRESHOLDS_M, p.accuracy)),
-            "%",
-            "higher",
-            1.0,
-        ),
-        Metric(
-            "compared", "Kinect joints that have an estimate", 100 * p.compared, "%", "higher", 0.3
-        ),
-        Metric("swapped", "frames with left and right swapped", p.swapped, "", "lower", 0, 0),
-        Metric("away", "frames facing away from the camera", p.away, "", "lower", 0, 0),
-        Metric("inside_out", "frames with the skin inside out", p.inside_out, "", "lower", 0, 0),
-    ]
 
 
 def section(scores: Sequence[RecordingScore], scenes: Sequence[SceneScore], conditions: str) -> str:
@@ -140,9 +59,9 @@ def section(scores: Sequence[RecordingScore], scenes: Sequence[SceneScore], cond
         "### Timing of the reference",
         _timing(scores),
         "### The ten worst recordings, by mean distance",
-        _worst(scores),
+        worst(scores),
         "### Recordings with a frame not tracking, swapped, facing away or inside out",
-        _failures(scores),
+        failures(scores),
     ]
     if scenes:
         parts += ["## Full scenes, from a cold start", _SCENES_SAY, _scenes(scenes)]
@@ -231,71 +150,6 @@ def _by_joint(scores: Sequence[RecordingScore]) -> str:
         "swapped frames",
     )
     return table(header, rows)
-
-
-def _worst(scores: Sequence[RecordingScore]) -> str:
-    ranked = sorted(scores, key=lambda s: -np.nan_to_num(nanmean(s.distances_m), nan=np.inf))
-    header = ("recording", "distance cm", "offset-free cm", "RMS mm", "what goes wrong")
-    rows = [
-        [
-            f"{s.name} {ACTIONS.get(s.action, '')}",
-            f"{100 * nanmean(s.distances_m):.1f}",
-            f"{100 * nanmean(s.offset_free_m):.1f}",
-            f"{1e3 * nanmean(s.residual_rms_m):.1f}",
-            what_goes_wrong(s),
-        ]
-        for s in ranked[:10]
-    ]
-    return table(header, rows)
-
-
-def _failures(scores: Sequence[RecordingScore]) -> str:
-    rows = []
-    for s in scores:
-        lost = int(np.sum(s.status != "tracking"))
-        counts = (lost, s.any_swapped.sum(), s.away.sum(), s.inside_out.sum())
-        if any(counts):
-            limbs = [f"{limb} {int(n.sum())}" for limb, n in s.swapped.items() if n.any()]
-            rows.append([s.name, str(len(s.status)), *map(str, counts), ", ".join(limbs) or "-"])
-    header = (
-        "recording",
-        "frames",
-        "not tracking",
-        "swapped",
-        "away",
-        "inside out",
-        "swapped limbs",
-    )
-    return table(header, rows) if rows else "None."
-
-
-def what_goes_wrong(s: RecordingScore) -> str:
-    """The numbers that say why a recording is far from its reference."""
-    means = np.array([nanmean(column) for column in s.distances_m.T])
-    free = np.array([nanmean(column) for column in s.offset_free_m.T])
-    order = np.argsort(-np.nan_to_num(means))[:2]
-    notes = [
-        "worst joints "
-        + ", ".join(
-            f"{JOINTS[j]} {100 * means[j]:.0f} cm (offset-free {100 * free[j]:.0f})" for j in order
-        )
-    ]
-    far: ndarray = np.any(s.distances_m > FAR_M, axis=1)
-    if far.any():
-        frames = np.flatnonzero(far)
-        notes.append(
-            f"a joint beyond {100 * FAR_M:.0f} cm in {len(frames)} of {len(far)} frames "
-            f"({frames[0]} to {frames[-1]})"
-        )
-    for count, says in (
-        (np.sum(s.status != "tracking"), "not tracking"),
-        (s.any_swapped.sum(), "swapped"),
-        (s.away.sum(), "facing away"),
-        (s.inside_out.sum(), "inside out"),
-    ):
-        if count:
-            notes.append(f"{count} frames {says}")
-    return "; ".join(notes)
 
 
 def _scenes(scenes: Sequence[SceneScore]) -> str:

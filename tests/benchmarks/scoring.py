@@ -34,6 +34,23 @@ JOINTS = (
 )
 """Names of the J = 13 joints compared."""
 
+ACTIONS = {
+    1: "swipe",
+    3: "wave",
+    4: "clap",
+    6: "arm cross",
+    13: "boxing",
+    16: "arm curl",
+    21: "pick up and throw",
+    22: "jog",
+    23: "walk",
+    24: "sit to stand",
+    25: "stand to sit",
+    26: "lunge",
+    27: "squat",
+}
+"""Number of an action of UTD-MHAD -> its name."""
+
 
 @dataclass(frozen=True)
 class RecordingScore:

@@ -25,8 +25,9 @@ import kintrack
 from kintrack.bench.cases import pitch_of
 from kintrack.geometry import LABELS, camera_pose
 from kintrack.joints import JOINT_NAMES
+from kintrack.labelling.disputes import part_iou
 from kintrack.labelling.foreground import find_foreground, only_person
-from kintrack.labelling.keeping import part_iou, top_reasons
+from kintrack.labelling.keeping import top_reasons
 from kintrack.labelling.opinions import LabelledFrame, Labeller, LabellingConfig
 from kintrack.labelling.passes import track_both_ways
 from kintrack.result import write_json

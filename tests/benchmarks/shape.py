@@ -1,49 +1,44 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How well a person's size is found: dressed synthetic people with known bodies, and real ones.
+"""What a body of one's own buys: average adult, template, calibrated, deformable; docs/results.md.
 
-Films people one by one (Kinect v2, nobody and nothing else in view but what they use), tracks them
-with the average adult's body and their true labels, calibrates, and compares. Real recordings have
-no truth: heights of the same person from different recordings are compared with each other, and
-the surface with that of the average adult.
+Films dressed synthetic people one by one (Kinect v2, nobody and nothing else in view but what they
+use), fits each with every kind of body, once with true labels and once with the network that
+ships, and compares joints, surface, height and limbs with the truth. Real recordings have no truth:
+heights of the same person from different recordings are compared with each other.
 
-    python -m tests.benchmarks.shape --people training --count 24 --output out/shape
-    python -m tests.benchmarks.shape --people held-out --count 16 --output out/shape
-    python -m tests.benchmarks.shape --real-folder ../shared/data/utd_mhad --output out/shape
+    python tests/benchmarks/shape.py                      # held-out people, docs/results.md
+    python tests/benchmarks/shape.py --people training    # for development; docs/ is left alone
 """
 
 from __future__ import annotations
 
-import json
-from collections import defaultdict
+import argparse
+import multiprocessing
+import os
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-import cv2
 import numpy as np
-import tyro
-from numpy import ndarray
-from scipy.spatial import cKDTree
+import report
+from command import OUT, parser, refuse_quick_baseline, run
+from shape_figure import draw
+from shape_scoring import Row, joint_error_m, lengths_of, tracked, true_lengths
+from shape_tables import real_tables, synthetic_tables
 
-from kintrack.alignment import view_skin
-from kintrack.association.observation import observe
 from kintrack.bench.cases import pitch_of
-from kintrack.body import run_kinematics
-from kintrack.calibration.measures import LIMBS, height
-from kintrack.calibration.person import Person, human_of
+from kintrack.calibration.config import BodyKind
+from kintrack.calibration.errors import CalibrationError
 from kintrack.calibration.recording import calibrate_recording
-from kintrack.config import TrackerConfig
-from kintrack.export import draw_overlay
-from kintrack.fit import posed_skin
-from kintrack.geometry import camera_pose, invert_rigid
-from kintrack.human import Human, load_human
-from kintrack.joints import JOINT_NAMES
-from kintrack.result import Track, write_json
+from kintrack.commands.segmenting import Segmentation
+from kintrack.config import StartConfig, TrackerConfig
+from kintrack.fit import load_person
+from kintrack.geometry import camera_pose
+from kintrack.result import TRACK_FILE, Track, make_result_folder, write_json
+from kintrack.segmenter import Segmenter
 from kintrack.sequence import open_sequence
-from kintrack.sequence.frame import Frame, SequenceReader
-from kintrack.sequence.reference import read_reference_joints
-from kintrack.tracker import Tracker
 from synthesis.dataset.recipes import (
     HELD_OUT_ACTIONS,
     held_out_clips,
@@ -52,51 +47,81 @@ from synthesis.dataset.recipes import (
     training_people,
 )
 from synthesis.dataset.record import folder_of, is_recorded, record
-from synthesis.people.population import load_population
 from synthesis.takes import Take
 
+GROUP = "shape"
 FRAMES, STRIDE = 60, 3
 """Six seconds of every authored action, two of every clip."""
-SURFACE_EVERY, SURFACE_CAP_M = 7, 0.10
-"""Frames and distance of `surface_rms`."""
-RIM_PX = 12
-"""Shown around the person in pictures [px]."""
-TOO_FAR_M = 0.10
-"""A track that is further off on average was lost; calibration cannot mend that [m]."""
-
-
-class TrueLabels:
-    """The segmenter that is always right."""
-
-    def segment(self, frame: Frame) -> ndarray:
-        """The recording's own labels."""
-        assert frame.labels is not None
-        return frame.labels
+PEOPLE = {"held-out": 16, "training": 24}
+"""How many are filmed."""
+REAL_ACTIONS = ("a03", "a22", "a27")
+"""Recordings of UTD-MHAD that are fitted, of each of its people."""
+BODIES: tuple[BodyKind, ...] = ("template", "calibrated", "deformable")
+"""Values of `kintrack fit --body`."""
+UNSIZED = TrackerConfig(start=StartConfig(shape_coefficients=0))
+"""The average adult as he is."""
 
 
 @dataclass(frozen=True)
-class Row:
-    """One recording."""
+class Job:
+    """One recording with labels of one kind."""
 
-    name: str
-    """Folder."""
-    person: int
-    """Who."""
-    height_m: float
-    """True height [m]."""
-    found: Person
-    """What was estimated."""
-    limb_errors: dict[str, float]
-    """Estimated over true length, minus one."""
-    tracked_m: float
-    """Mean joint error of the track with the average adult [m]."""
-    retracked_m: float
-    """Mean joint error with the calibrated, dressed person [m]."""
+    folder: Path
+    """Where recordings and results go."""
+    labels: Literal["network", "recording", "none"]
+    """As of `kintrack fit`."""
+    take: Take | None = None
+    """A synthetic recording, filmed where it is missing."""
+    real: Path | None = None
+    """A real recording."""
+    mocap: Path = Path()
+    """Folder of motion capture clips."""
 
-    @property
-    def height_error_m(self) -> float:
-        """Estimated minus true height [m]."""
-        return self.found.height.value_m - self.height_m
+
+def main() -> int:
+    """Film, fit, score, write."""
+    arguments = _arguments()
+    refuse_quick_baseline(arguments)
+    folder = make_result_folder(OUT / GROUP)
+    jobs = _jobs(arguments, folder)
+    rows = _run(jobs, arguments.jobs)
+    made_up = [row for row in rows if np.isfinite(row.height_m)]
+    real = [row for row in rows if not np.isfinite(row.height_m)]
+    text = synthetic_tables(made_up) + ("\n\n" + real_tables(real) if real else "")
+    print(text)
+    write_json(folder / f"{arguments.people}.json", {"rows": [asdict(row) for row in rows]})
+    if arguments.people == "held-out" and not arguments.quick:
+        facts = report.conditions(
+            data=f"{PEOPLE['held-out']} held-out people of `synthesis.people`, held-out actions "
+            f"and clips, Kinect v2; UTD-MHAD {', '.join(REAL_ACTIONS)}",
+            seeds="78 for people; (5, 1, n) for recording n",
+        )
+        body = f"## A body of one's own\n\n{text}\n\n{report.bullets(facts)}"
+        report.rewrite_section(report.RESULTS, GROUP, body)
+    return 0
+
+
+def _arguments() -> argparse.Namespace:
+    made = parser(__doc__)
+    made.add_argument("--people", choices=list(PEOPLE), default="held-out")
+    made.add_argument("--jobs", type=int, default=2, help="recordings at once")
+    return made.parse_args()
+
+
+def _jobs(arguments: argparse.Namespace, folder: Path) -> list[Job]:
+    mocap = arguments.data / "mocap"
+    filmed = takes(arguments.people, PEOPLE[arguments.people], mocap)
+    found = sorted((arguments.data / "utd_mhad").glob("a??_s?_t?"))
+    real = [path for path in found if path.name.split("_")[0] in REAL_ACTIONS]
+    if arguments.quick:
+        filmed, real = filmed[:2], real[:1]
+    jobs = []
+    for take in filmed:
+        jobs.append(Job(folder, "recording", take=take, mocap=mocap))
+        jobs.append(Job(folder, "network", take=take, mocap=mocap))
+    if arguments.people == "held-out":
+        jobs += [Job(folder, "none", real=path) for path in real]
+    return jobs
 
 
 def takes(people: str, count: int, mocap: Path) -> list[Take]:
@@ -127,240 +152,87 @@ def takes(people: str, count: int, mocap: Path) -> list[Take]:
     return out
 
 
-def track_of(sequence: SequenceReader, human: Human, pitch_deg: float, labelled: bool) -> Track:
-    """The recording tracked with one body that is not sized."""
-    config = TrackerConfig()
-    config = replace(config, start=replace(config.start, shape_coefficients=0))
-    tracker = Tracker(
-        config,
-        human,
-        T_world_camera=camera_pose(pitch_deg),
-        segmenter=TrueLabels() if labelled else None,
-    )
-    return Track.from_frames(JOINT_NAMES, [tracker.step(frame) for frame in sequence])
+def _run(jobs: Sequence[Job], processes: int) -> list[Row]:
+    """All rows, in the order of the jobs."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"  # inherited by the processes started below
+    context = multiprocessing.get_context("spawn")
+    rows: dict[int, list[Row]] = {}
+    with ProcessPoolExecutor(processes, context) as pool:
+        filmed = [pool.submit(film, job) for job in jobs if job.labels == "recording"]
+        for made in as_completed(filmed):
+            made.result()
+        futures = {pool.submit(score, job): n for n, job in enumerate(jobs)}
+        for future in as_completed(futures):
+            found = future.result()
+            rows[futures[future]] = found
+            said = ", ".join(
+                f"{row.body} {100 * row.joints_m:.2f} cm ({row.used})" for row in found
+            )
+            print(f"{found[0].name} {found[0].labels}: {said}", flush=True)
+    return [row for n in sorted(rows) for row in rows[n]]
 
 
-def score(folder: Path, pictures: Path) -> Row | None:
-    """Calibrate and draw one synthetic recording; None where nobody was tracked."""
-    sequence, pitch_deg = open_sequence(folder), pitch_of(folder)
-    average = load_human()
-    track = track_of(sequence, average, pitch_deg, True)
-    names, reference = read_reference_joints(folder / "reference_joints.csv")
-    truth = reference[:, [list(names).index(name) for name in JOINT_NAMES]]
-    if not (track.status == "tracking").any():
-        return None
-    person = calibrate_recording(
-        sequence, track, average, camera_pose(pitch_deg), segmenter=TrueLabels()
-    )
-    again = track_of(sequence, human_of(person), pitch_deg, True)
-    index = person.frames[len(person.frames) // 2]
-    if again.status[index] == "tracking":
-        bodies = [(average, track), (human_of(person), again)]
-        draw(folder, bodies, index, pictures / f"{folder.name}.png")
-    who = int(json.loads((folder / "take.json").read_text())["take"]["person"])
-    population = load_population()
-    _, points = population.body(who)
-    errors = {}
-    for limb, (first, last) in LIMBS.items():
-        sides = [np.linalg.norm(points[f"{s}_{last}"] - points[f"{s}_{first}"]) for s in "lr"]
-        errors[limb] = person.limbs[limb].value_m / float(np.mean(sides)) - 1.0
-    return Row(
-        folder.name,
-        who,
-        float(population.heights_m[who]),
-        person,
-        errors,
-        _error(track, truth),
-        _error(again, truth),
-    )
+def film(job: Job) -> None:
+    """Make a synthetic recording where it is missing."""
+    assert job.take is not None
+    if not is_recorded(job.folder, job.take):
+        record(job.take, job.folder, job.mocap)
 
 
-def draw(folder: Path, bodies: Sequence[tuple[Human, Track]], index: int, path: Path) -> None:
-    """One frame: the depth, then the skin of every body over it, cut to the person."""
-    frame, T = open_sequence(folder).frame(index), camera_pose(pitch_of(folder))
-    pictures = []
-    for human, track in bodies:
-        whole = draw_overlay(
-            frame,
-            posed_skin(human, track.q[index], T),
-            human.skin.faces,
-            human.skin.labels,
-            track.joint_positions_camera_m[index],
-            "tracking",
-            "",
-            None,
-        )
-        assert frame.labels is not None
-        rows, columns = (np.flatnonzero((frame.labels > 0).any(axis=a)) for a in (1, 0))
-        bar, width = len(whole) - frame.camera.height, frame.camera.width
-        tall = slice(bar + max(rows[0] - RIM_PX, 0), bar + rows[-1] + RIM_PX)
-        wide = [max(columns[0] - RIM_PX, 0), columns[-1] + RIM_PX]
-        if not pictures:
-            pictures.append(whole[tall, wide[0] : wide[1]])
-        pictures.append(whole[tall, width + wide[0] : width + wide[1]])
-    sheet = cv2.resize(np.hstack(pictures), None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(path), cv2.cvtColor(sheet, cv2.COLOR_RGB2BGR))
-
-
-def _error(track: Track, truth: ndarray) -> float:
-    good = track.status == "tracking"
-    off = np.linalg.norm(track.joint_positions_camera_m[good] - truth[good], axis=2)
-    return float(np.nanmean(off)) if good.any() else float("nan")
-
-
-def summary(rows: Sequence[Row]) -> dict[str, Any]:
-    """Means over the recordings whose track was on the person, and over all."""
-    out: dict[str, Any] = {}
-    average_m = height(np.zeros(1))[0]
-    for name, chosen in (
-        ("all", list(rows)),
-        ("well tracked", [row for row in rows if row.tracked_m < TOO_FAR_M]),
-        (
-            "well tracked and believed",
-            [row for row in rows if row.tracked_m < TOO_FAR_M and not row.found.problems],
-        ),
-    ):
-        if not chosen:
-            continue
-        off = np.array([row.height_error_m for row in chosen])
-        sure = off / np.array([row.found.height.sigma_m for row in chosen])
-        out[name] = {
-            "recordings": len(chosen),
-            "believed": sum(not row.found.problems for row in chosen),
-            "template height error cm": 100
-            * np.mean([abs(r.height_m - average_m) for r in chosen]),
-            "height error cm": 100 * np.abs(off).mean(),
-            "height error cm, median": 100 * np.median(np.abs(off)),
-            "height bias cm": 100 * off.mean(),
-            "height within 1.5 cm %": 100 * np.mean(np.abs(off) <= 0.015),
-            "height error / sigma, RMS": float(np.sqrt(np.mean(sure**2))),
-            "limb error %": {
-                limb: 100 * np.mean([abs(row.limb_errors[limb]) for row in chosen])
-                for limb in LIMBS
-            },
-            "limb bias %": {
-                limb: 100 * np.mean([row.limb_errors[limb] for row in chosen]) for limb in LIMBS
-            },
-            "joint error cm, template": 100 * np.nanmean([row.tracked_m for row in chosen]),
-            "joint error cm, calibrated": 100 * np.nanmean([row.retracked_m for row in chosen]),
-            "joint error cm, template, median": 100 * np.nanmedian([r.tracked_m for r in chosen]),
-            "joint error cm, calibrated, median": 100
-            * np.nanmedian([r.retracked_m for r in chosen]),
-        }
-    return out
-
-
-def real(folder: Path, actions: Sequence[str]) -> dict[str, Any]:
-    """Heights of the same person from different recordings, and the surface's distance."""
-    heights: dict[str, list[float]] = defaultdict(list)
+def score(job: Job) -> list[Row]:
+    """Fit a recording with every kind of body."""
+    path = folder_of(job.folder, job.take) if job.take is not None else job.real
+    assert path is not None
+    sequence, segmenter = open_sequence(path), Segmentation(job.labels).segmenter()
+    T = camera_pose(pitch_of(path) if job.take is not None else 0.0)
+    results = job.folder / "results" / path.name / job.labels
     rows = []
-    for path in sorted(folder.glob("a*_s*_t*")):
-        action, subject, _ = path.name.split("_")
-        if action not in actions:
-            continue
-        sequence, average = open_sequence(path), load_human()
-        track = track_of(sequence, average, 0.0, False)
-        if not (track.status == "tracking").any():
-            rows.append({"name": path.name, "problems": ["nobody was tracked"]})
-            continue
-        person = calibrate_recording(sequence, track, average)
-        again = track_of(sequence, human_of(person), 0.0, False)
-        heights[subject].append(person.height.value_m)
-        rows.append(
-            {
-                "name": path.name,
-                "height_m": person.height,
-                "problems": person.problems,
-                "surface_rms_mm": [
-                    1e3 * surface_rms(sequence, *pair)
-                    for pair in ((average, track), (human_of(person), again))
-                ],
-                "inlier_rms_mm": [
-                    1e3 * float(np.nanmedian(t.residual_rms_m)) for t in (track, again)
-                ],
-                "agreement_cm": [100 * _agreement(t, path) for t in (track, again)],
-                "tracking": [int((t.status == "tracking").sum()) for t in (track, again)],
-            }
+
+    def fitted(name: str, body: BodyKind, config: TrackerConfig | None = None, person=None) -> None:
+        track, surface_m, said = tracked(
+            sequence, results / name, body, segmenter, T, person, config
         )
-        print(rows[-1], flush=True)
-    spans = {s: 100 * float(np.ptp(h)) for s, h in heights.items()}
-    deviations = {s: 100 * float(np.std(h)) for s, h in heights.items()}
-    return {"recordings": rows, "span cm": spans, "standard deviation cm": deviations}
-
-
-def surface_rms(sequence: SequenceReader, human: Human, track: Track) -> float:
-    """Root mean square distance of everything observed from the seen skin, capped [m].
-
-    Every pixel counts, along the normal of its nearest visible vertex.
-    """
-    T, config, squares = camera_pose(0.0), TrackerConfig(), []
-    for index in np.flatnonzero(track.status == "tracking")[::SURFACE_EVERY]:
-        frame = sequence.frame(int(index))
-        observation = observe(frame, config.association.max_width_px)
-        state = run_kinematics(human.body, track.q[index])
-        view = view_skin(human, state, invert_rigid(T), observation, config)
-        seen, points = np.flatnonzero(view.visible), observation.points_camera[observation.region]
-        nearest = seen[cKDTree(view.vertices_camera[seen]).query(points)[1]]
-        away = points - view.vertices_camera[nearest]
-        along = np.einsum("ij,ij->i", away, view.normals_camera[nearest])
-        squares.append(np.minimum(along**2, SURFACE_CAP_M**2))
-    return float(np.sqrt(np.concatenate(squares).mean()))
-
-
-def _agreement(track: Track, folder: Path) -> float:
-    names, reference = read_reference_joints(folder / "reference_joints.csv")
-    shared = [name for name in JOINT_NAMES if name in names]
-    ours = track.joint_positions_camera_m[:, [JOINT_NAMES.index(name) for name in shared]]
-    theirs = reference[: len(ours), [list(names).index(name) for name in shared]]
-    good = track.status == "tracking"
-    return float(np.nanmean(np.linalg.norm(ours - theirs, axis=2)[good]))
-
-
-def main(
-    output: Path = Path("out/shape"),
-    people: Literal["training", "held-out"] = "training",
-    count: int = 24,
-    mocap: Path = Path("../shared/data/mocap"),
-    real_folder: Path | None = None,
-    actions: tuple[str, ...] = ("a03", "a22"),
-) -> None:
-    """Film, track, calibrate, compare; writes one JSON.
-
-    Args:
-        output: Where recordings and results go.
-        people: Whom to film; held-out people are only for the last check.
-        count: How many.
-        mocap: Folder of motion capture clips.
-        real_folder: Folder of real recordings named aAA_sS_tT; measured instead of synthetic ones.
-        actions: Which of the real ones.
-    """
-    if real_folder is not None:
-        found = real(real_folder, actions)
-        write_json(output / "real.json", found)
-        print(json.dumps({k: v for k, v in found.items() if k != "recordings"}, indent=2))
-        return
-    rows = []
-    for take in takes(people, count, mocap):
-        if not is_recorded(output, take):
-            record(take, output, mocap)
-        row = score(folder_of(output, take), output / "pictures" / people)
-        if row is None:
-            print(f"{take.name}: nobody was tracked", flush=True)
-            continue
+        tall, limbs = lengths_of(said)
+        row = Row(
+            name=path.name,
+            labels=job.labels,
+            body=name,
+            used=said["used"],
+            joints_m=joint_error_m(track, path),
+            tracked=float(np.mean(track.status == "tracking")),
+            surface_m=surface_m,
+            height=tall,
+            limbs=limbs,
+        )
+        if job.take is not None:
+            height_m, limbs_m = true_lengths(path)
+            row = replace(row, height_m=height_m, limbs_m=limbs_m)
         rows.append(row)
-        print(
-            f"{row.name:28s} height {row.height_m:.3f} {100 * row.height_error_m:+5.1f} cm "
-            f"(± {100 * row.found.height.sigma_m:.1f})  limbs "
-            + " ".join(f"{100 * e:+5.1f}" for e in row.limb_errors.values())
-            + f" %  joints {100 * row.tracked_m:.2f} -> {100 * row.retracked_m:.2f} cm  "
-            + "; ".join(row.found.problems),
-            flush=True,
-        )
-    found = summary(rows)
-    write_json(output / f"{people}.json", {"summary": found, "rows": [asdict(r) for r in rows]})
-    print(json.dumps(found, indent=2))
+
+    fitted("average", "template", UNSIZED)
+    for body in BODIES:
+        fitted(body, body)
+    if job.take is not None:
+        _whole(fitted, sequence, results, segmenter, T)
+        if job.labels == "recording":
+            shown = [results / name for name in ("average", "template", "calibrated")]
+            picture = job.folder / "pictures" / f"{path.name}.png"
+            draw(sequence.frame(len(sequence) // 2), shown, T, picture)
+    return rows
+
+
+def _whole(fitted, sequence, results: Path, segmenter: Segmenter | None, T: np.ndarray) -> None:
+    """As `kintrack calibrate` and `kintrack fit --person` do."""
+    human, _ = load_person(results / "template")
+    track = Track.load(results / "template" / TRACK_FILE)
+    try:
+        person = calibrate_recording(sequence, track, human, T, segmenter)
+    except CalibrationError as error:
+        print(f"{sequence.name}: {error}", flush=True)
+        return
+    fitted("whole", "calibrated", None, person)
 
 
 if __name__ == "__main__":
-    tyro.cli(main)
+    run(main)

@@ -27,7 +27,8 @@ from kintrack.geometry import invert_rigid, transform_points
 from kintrack.human import Human, load_human
 from kintrack.joints import JOINT_NAMES
 from kintrack.judge import label_agreement, label_counts
-from kintrack.lifecycle import Life, LifecycleConfig, Reading, absent, judged
+from kintrack.labelled_config import LifecycleConfig
+from kintrack.lifecycle import Life, Reading, absent, judged
 from kintrack.result import write_json
 from kintrack.segmenter import Segmenter
 from kintrack.sequence import open_sequence

@@ -35,6 +35,7 @@ class Scene:
     """What a calibration gets, and the truth."""
 
     shape: ndarray
+    depths_m: list[ndarray]
     observations: list[Observation]
     qs_template: list[ndarray]
     joints_m: ndarray
@@ -47,15 +48,12 @@ def placed(body, degrees, heading_deg, at=(2.8, 0.0, 0.0)) -> ndarray:
     return q
 
 
-def observed(vertices_world, faces, labelled=None) -> Observation:
-    """What a noiseless camera sees of a surface; nothing else is there."""
+def seen(vertices_world, faces, labelled) -> tuple[ndarray, ndarray]:
+    """Depth and labels of a surface that a noiseless camera sees; nothing else is there."""
     T_camera_world = invert_rigid(T_LEVEL_WORLD_CAMERA)
     depth, face = rasterise(transform_points(T_camera_world, vertices_world), faces, CAMERA)
     depth = np.where(np.isfinite(depth), depth, 0.0).astype(np.float32)
-    labels = None
-    if labelled is not None:
-        labels = np.where(face >= 0, labelled[faces[face, 0]], 0).astype(np.uint8)
-    return observe(Frame(0, 0.0, CAMERA, depth), 320, labels=labels)
+    return depth, np.where(face >= 0, labelled[faces[face, 0]], 0).astype(np.uint8)
 
 
 def scene_of(shape, worn_m=0.02, poses=POSES, noise_rad=0.05) -> Scene:
@@ -66,15 +64,17 @@ def scene_of(shape, worn_m=0.02, poses=POSES, noise_rad=0.05) -> Scene:
     dressed, body = dressed_space(space), space.body(b)
     skin = dressed.bound(np.concatenate([b, np.full(len(REGIONS), worn_m)]))
     rng, template = np.random.default_rng(0), load_human().body
-    observations, qs, joints = [], [], []
+    depths, observations, qs, joints = [], [], [], []
     for degrees, heading in poses:
         q = placed(body, degrees, heading)
         state = run_kinematics(body, q)
-        observations.append(observed(skinned_vertices(state, skin), skin.faces, skin.labels))
+        depth, labels = seen(skinned_vertices(state, skin), skin.faces, skin.labels)
+        depths.append(depth)
+        observations.append(observe(Frame(0, 0.0, CAMERA, depth), 320, labels=labels))
         joints.append(
             transform_points(invert_rigid(T_LEVEL_WORLD_CAMERA), state.joint_positions_world)
         )
         q = template.integrate(q, noise_rad * rng.normal(size=template.nv))
         q[7:] = np.clip(q[7:], template.lower[6:], template.upper[6:])
         qs.append(q)
-    return Scene(b, observations, qs, np.array(joints))
+    return Scene(b, depths, observations, qs, np.array(joints))

@@ -8,7 +8,7 @@ import pytest
 
 from kintrack.body import run_kinematics
 from kintrack.calibration import bundle
-from kintrack.calibration.blocks import Blocks, BundleConfig, Snapshot, blocks_of, surface_of
+from kintrack.calibration.blocks import Blocks, Snapshot, blocks_of, surface_of
 from kintrack.calibration.bundle import Gaussian, Measurement, solve_bundle
 from kintrack.calibration.clothing import (
     REGIONS,
@@ -17,6 +17,7 @@ from kintrack.calibration.clothing import (
     dressed_space,
     fold_sigma,
 )
+from kintrack.calibration.config import BundleConfig
 from kintrack.config import TrackerConfig
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.human import RESTING_DEG, Human, load_human, posed, prior_sigma

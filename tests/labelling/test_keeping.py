@@ -8,15 +8,14 @@ import pytest
 
 from kintrack.errors import ConfigError
 from kintrack.joints import JOINT_NAMES
+from kintrack.labelling.disputes import disputes, part_iou
 from kintrack.labelling.keeping import (
     REASONS,
     KeepingConfig,
     Opinion,
     Reason,
-    disputes,
     fastest,
     objections,
-    part_iou,
     top_reasons,
     turning,
     unconfirmed,

@@ -6,57 +6,11 @@ import pytest
 from scipy.linalg import block_diag
 
 from kintrack.body import run_kinematics
-from kintrack.config import PriorConfig, SurfaceConfig
-from kintrack.human import RESTING_DEG, posed, prior_sigma
-from kintrack.residuals.joints import JointResidual
+from kintrack.human import RESTING_DEG, posed
 from kintrack.residuals.linearization import quadratic_of
 from kintrack.residuals.prior import diagonal_prior, gaussian_prior
-from kintrack.residuals.surface import silhouette_residual, surface_residual
 from kintrack.residuals.targets import TargetResidual
-from kintrack.skin import skinned_vertices, vertex_normals
-
-
-def surface(human, state, rng):
-    vertices = skinned_vertices(state, human.skin)
-    vertex = rng.choice(len(vertices), 200)
-    points = vertices[vertex] + rng.normal(0, 0.02, (200, 3))
-    normals = vertex_normals(vertices, human.skin.faces)
-    return surface_residual(human.skin, vertex, points, vertices, normals, SurfaceConfig())
-
-
-def silhouette(human, state, rng):
-    vertices = skinned_vertices(state, human.skin)
-    vertex = rng.choice(len(vertices), 60)
-    points = vertices[vertex] + rng.normal(0, 0.1, (60, 3))
-    return silhouette_residual(human.skin, vertex, points, vertices, SurfaceConfig())
-
-
-def pose_prior(human, state, rng):
-    resting = posed(human.body, RESTING_DEG)
-    return diagonal_prior(resting, prior_sigma(human.body, PriorConfig()))
-
-
-def motion_prior(human, state, rng):
-    root = rng.normal(0, 0.1, (human.body.nv, human.body.nv))
-    covariance = root @ root.T + 0.01 * np.eye(human.body.nv)
-    predicted = human.body.integrate(state.q, rng.normal(0, 0.2, human.body.nv))
-    return gaussian_prior(predicted, covariance)
-
-
-def joints(human, state, rng):
-    rows = np.array([0, 4, 8, 12])
-    places = state.joint_positions_world[rows] + rng.normal(0, 0.1, (4, 3))
-    return JointResidual(rows, places, 0.03)
-
-
-def targets(human, state, rng):
-    rows = np.array([3, 6, 11, 14])
-    away = rng.normal(size=(4, 3))
-    away *= np.array([0.05, 0.4, 0.3, 0.6])[:, None] / np.linalg.norm(away, axis=1, keepdims=True)
-    return TargetResidual(rows, state.joint_positions_world[rows] + away, 0.1, 0.2)
-
-
-TERMS = [surface, silhouette, pose_prior, motion_prior, joints, targets]
+from residual_terms import TERMS, pose_prior
 
 
 @pytest.fixture(params=TERMS, ids=lambda make: make.__name__)

@@ -15,8 +15,7 @@ from kintrack.residuals.prior import diagonal_prior
 from kintrack.solver import gauss_newton, ipopt, nlp
 from kintrack.solver.choice import SOLVERS
 from kintrack.solver.ipopt import minimise, solve
-
-from .ipopt_terms import joints, motion_prior, pose_prior, silhouette, surface
+from residual_terms import joints, motion_prior, pose_prior, silhouette, surface
 
 pytest.importorskip("casadi")
 

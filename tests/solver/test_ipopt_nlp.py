@@ -10,8 +10,7 @@ from kintrack.human import load_human
 from kintrack.solver.nlp import programme
 from kintrack.solver.nlp_terms import Parameters, bonds, parameters
 from kintrack.solver.symbolic_body import tree_of
-
-from .ipopt_terms import KINDS, motion_prior, pose_prior, surface
+from residual_terms import SQUARES, motion_prior, pose_prior, surface
 
 ca = pytest.importorskip("casadi")
 STEP = 1e-5
@@ -42,10 +41,10 @@ def moved(made, given, state, step):
 
 
 def all_terms(human, state, rng):
-    return [kind(human, state, rng) for kind in KINDS]
+    return [kind(human, state, rng) for kind in SQUARES]
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", SQUARES, ids=lambda kind: kind.__name__)
 def test_the_cost_of_every_term_is_that_of_its_residual(build, human, legal_pose, kind):
     for seed in range(3):
         state, rng = run_kinematics(human.body, legal_pose(seed)), np.random.default_rng(seed)

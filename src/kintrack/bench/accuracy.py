@@ -21,9 +21,9 @@ from kintrack.bench.running import Fitting, run_all
 from kintrack.bench.scores import Errors, errors_of
 from kintrack.bench.summary import content_of
 from kintrack.errors import ResultError, SequenceError
-from kintrack.evaluate import REFERENCE_FILE
 from kintrack.result import TRACK_FILE, make_result_folder, write_json
 from kintrack.sequence import open_sequence
+from kintrack.sequence.reference import REFERENCE_FILE
 from segmentation.weights import load_weights
 
 RESULT_FILE = "accuracy.json"

@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import segmentation
-from kintrack.body import model_folder
+from kintrack.rig import model_folder
 
 NOT_TRACKING = (
     "bench",
@@ -18,7 +18,7 @@ NOT_TRACKING = (
     "cli",
     "commands",
     "demo",
-    "evaluate",
+    "evaluation",
     "export",
     "labelling",
     "metrics",

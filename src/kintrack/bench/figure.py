@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from kintrack.bench.cases import ALONE, CLEAN, OBJECTS, REAL, ROOM, SCENE
-from kintrack.bench.methods import COLD, GEOMETRY, NO_TARGETS, RGB, TRUE_LABELS
+from kintrack.bench.methods import CALIBRATED, COLD, GEOMETRY, NO_TARGETS, RGB, TRUE_LABELS
 from kintrack.joints import JOINT_NAMES
 from kintrack.result import write_atomically
 
@@ -53,15 +53,16 @@ def write_pictures(content: dict[str, Any], folder: Path) -> tuple[Path, ...]:
 def in_words(method: str) -> str:
     """What a method is called in pictures and tables."""
     warm = method.removesuffix(COLD)
-    bare = warm.removesuffix(NO_TARGETS)
-    off = ", targets off" if bare != warm else ""
+    bare = warm.removesuffix(NO_TARGETS).removesuffix(CALIBRATED)
+    off = ", targets off" if NO_TARGETS in warm else ", calibrated" if CALIBRATED in warm else ""
     return _NAMES.get(bare, bare) + off + (", cold start" if warm != method else "")
 
 
 def draw_curves(scores: dict[str, Any]) -> Figure:
-    """Share of joints within a threshold: a colour per method, dashed where it starts cold.
+    """Share of joints within a threshold.
 
-    A row per group of recordings and kind of joint, a column per condition.
+    A colour per method, dashed where it starts cold, dash-dotted where the person is calibrated; a
+    row per group of recordings and kind of joint, a column per condition.
     """
     rows = [
         (group, part)
@@ -101,18 +102,18 @@ def _curves(
     axis: Axes, scores: dict[str, Any], group: str, condition: str, part: str
 ) -> dict[str, Any]:
     lines = {}
-    networks = [name for name in scores if name.removesuffix(COLD) not in _NAMES]
-    bare = list(dict.fromkeys(name.removesuffix(COLD) for name in networks))
+    kinds = {name: name.removesuffix(COLD).removesuffix(CALIBRATED) for name in scores}
+    bare = list(dict.fromkeys(kind for kind in kinds.values() if kind not in _NAMES))
     for method, groups in scores.items():
         found = groups.get(group, {}).get(condition)
         if found is None or found[part]["accuracy"] is None:
             continue
         name = method.removesuffix(COLD)
-        color = _COLORS.get(name) or _NETWORKS[bare.index(name) % len(_NETWORKS)]
+        color = _COLORS.get(kinds[method]) or _NETWORKS[bare.index(kinds[method]) % len(_NETWORKS)]
         (lines[method],) = axis.plot(
             100 * np.array(found["thresholds_m"]),
             100 * np.array(found[part]["accuracy"]),
-            "-" if name == method else "--",
+            "--" if name != method else "-." if CALIBRATED in name else "-",
             color=color,
             lw=1.9 if bare and name == bare[0] else 1.2,
         )
@@ -124,7 +125,8 @@ def draw_joints(scores: dict[str, Any]) -> Figure:
 
     Without a network, the first method's.
     """
-    own = next((name for name in scores if name not in _NAMES and COLD not in name), None)
+    networks = [name for name in scores if name.removesuffix(CALIBRATED) not in _NAMES]
+    own = next((name for name in networks if COLD not in name), None)
     method = own or next(iter(scores))
     groups = [group for group in TITLES if group in scores[method]]
     figure = Figure(figsize=(7.6, 2.3 * max(len(groups), 1) + 0.6), layout="constrained")

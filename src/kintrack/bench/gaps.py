@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,14 +13,14 @@ from jaxtyping import Bool, Float, UInt8
 from numpy import ndarray
 
 from kintrack.bench.cases import ABSENT, HIDDEN, Case
-from kintrack.bench.inserting import MADE_FILE, is_made
+from kintrack.bench.made import finish, is_made, recipe_of
 from kintrack.errors import SceneError
 from kintrack.geometry import camera_pose
 from kintrack.joints import JOINT_NAMES
 from kintrack.sequence import open_sequence
 from kintrack.sequence.frame import Frame, SequenceReader
 from kintrack.sequence.occlusion import OCCLUSION_FILE, read_occlusion
-from kintrack.sequence.reference import read_reference_joints
+from kintrack.sequence.reference import REFERENCE_FILE, read_reference_joints
 from kintrack.sequence.write import SequenceWriter
 from synthesis.objects.finishes import board as board_finish
 from synthesis.objects.shapes import box
@@ -57,8 +56,8 @@ class Gap:
 
     def recipe(self) -> str:
         """What the folder must have been made of."""
-        facts = (self.clean.fingerprint(), self.case.condition, self.seed, GAP_S, BEFORE_SHARE)
-        return hashlib.sha256(repr(facts).encode()).hexdigest() + "\n"
+        made_of = self.clean.fingerprint()
+        return recipe_of(made_of, self.case.condition, self.seed, GAP_S, BEFORE_SHARE)
 
     def is_made(self) -> bool:
         """Whether it is there, whole, and made of what is asked for."""
@@ -82,7 +81,7 @@ class Gap:
             change = lambda frame: composite(frame, inserted, rng).frame  # noqa: E731
         assert change is not None
         shutil.rmtree(folder, ignore_errors=True)
-        names, joints = read_reference_joints(self.clean.sequence / "reference_joints.csv")
+        names, joints = read_reference_joints(self.clean.sequence / REFERENCE_FILE)
         shares, hidden = read_occlusion(self.clean.sequence / OCCLUSION_FILE)
         writer = SequenceWriter(folder, sequence.camera, joint_names=names)
         for n, frame in enumerate(sequence):
@@ -100,7 +99,7 @@ class Gap:
                 hidden_joints=[JOINT_NAMES[j] for j in np.flatnonzero(behind)],
             )
             on_frame()
-        (folder / MADE_FILE).write_text(self.recipe())
+        finish(folder, self.recipe())
 
     def _absent(self, sequence: SequenceReader) -> Callable[[Frame], Frame]:
         """What makes a frame one of the room alone."""

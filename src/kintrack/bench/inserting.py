@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from kintrack.bench.cases import REDRAWS, SHARE, Case
+from kintrack.bench.made import finish, is_made, recipe_of
 from kintrack.errors import SceneError
 from kintrack.geometry import camera_pose
 from kintrack.sequence import open_sequence
@@ -20,9 +20,6 @@ from synthesis.objects.catalogue import held_out_things
 from synthesis.objects.cutout import load_scene_frame
 from synthesis.occlusion.occlude import OccludeConfig, occlude
 from synthesis.occlusion.placing import PlacingConfig
-
-MADE_FILE = "made.txt"
-"""Tells what a recording was made of, written when it is whole."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +38,7 @@ class Insertion:
     def recipe(self) -> str:
         """What the folder must have been made of."""
         scenes = None if self.scenes is None else self.scenes.name
-        facts = (self.clean.fingerprint(), self.case.condition, self.seed, scenes)
-        return hashlib.sha256(repr(facts).encode()).hexdigest() + "\n"
+        return recipe_of(self.clean.fingerprint(), self.case.condition, self.seed, scenes)
 
     def is_made(self) -> bool:
         """Whether it is there, whole, and made of what is asked for."""
@@ -71,7 +67,7 @@ class Insertion:
                     open_sequence(self.clean.sequence),
                     folder,
                     None if distance_m is None else thing,
-                    None if self.scenes is None else _view(self.scenes, view),
+                    None if self.scenes is None else view_of(self.scenes, view),
                     OccludeConfig(PlacingConfig(distance_m or 0.45, SHARE), seed=seed),
                     camera_pose(self.case.pitch_deg),
                     on_frame=lambda n: on_frame(),
@@ -79,22 +75,17 @@ class Insertion:
             except SceneError as error:
                 problem = error
                 continue
-            (folder / MADE_FILE).write_text(self.recipe())
-            return
+            return finish(folder, self.recipe())
         shutil.rmtree(folder, ignore_errors=True)
         raise problem
 
 
-def is_made(folder: Path, recipe: str) -> bool:
-    """Whether a folder is whole and made of what is asked for."""
-    try:
-        return (folder / MADE_FILE).read_text() == recipe
-    except OSError:
-        return False
+def view_of(scenes: Path, share: float) -> Mesh:
+    """One of the views of a room, by a number in 0..1.
 
-
-def _view(scenes: Path, share: float) -> Mesh:
-    """One of the views of a room, by a number in 0..1."""
+    Raises:
+        SceneError: if there is none.
+    """
     count = len(list(scenes.glob("*.depth.png")))
     if count == 0:
         raise SceneError(f"{scenes} holds no NNNNNN.depth.png to put people into")

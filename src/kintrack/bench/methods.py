@@ -14,6 +14,7 @@ from numpy import ndarray
 
 from kintrack.bench.cases import ALONE, CLEAN, GAPS, REAL, ROOM, SCENES, Case
 from kintrack.bench.rgb import regress
+from kintrack.calibration.config import BodyConfig
 from kintrack.config import PullConfig, TrackerConfig
 from kintrack.errors import ConfigError
 from kintrack.fit import fit_sequence
@@ -22,14 +23,14 @@ from kintrack.joints import JOINT_NAMES
 from kintrack.segmenter import Segmenter
 from kintrack.sequence import open_sequence
 from kintrack.sequence.frame import Frame
-from kintrack.sequence.reference import read_reference_joints
+from kintrack.sequence.reference import REFERENCE_FILE, read_reference_joints
 from segmentation.runtime import RuntimeConfig, load_segmenter
 from segmentation.tracking import ImageSegmenter, TrueSegmenter
 
 BEFORE_S = 1.0 / 30.0
 """How long before the recording a tracker that starts warm is started [s]."""
 GEOMETRY, TRUE_LABELS, RGB, NETWORK = "geometry", "true_labels", "rgb", "network"
-COLD, NO_TARGETS = "_cold", "_no_targets"
+COLD, NO_TARGETS, CALIBRATED = "_cold", "_no_targets", "_calibrated"
 OFF = PullConfig(sigma_m=1e6)
 """A pull of no weight."""
 HARDEST = "30 cm"
@@ -53,12 +54,18 @@ class Method:
     """Whether it is what this project does: the first network."""
     targets: bool = True
     """Whether rough places of the parts pull while tracking."""
+    calibrated: bool = False
+    """Whether it gets to know the person, as `kintrack fit` does; the others track the average
+    adult in the size of the first frame."""
 
     def runs_on(self, case: Case) -> bool:
         """Whether the bench asks it about a recording."""
         if not self.targets:
             gap = not self.cold and case.condition in GAPS
             return case.group == ROOM and (gap or case.condition == HARDEST)
+        if self.calibrated:
+            warm = case.group == ROOM and case.condition not in GAPS and not self.cold
+            return warm or case.group == SCENES and self.cold and self.main
         if case.group == SCENES:
             return self.cold and self.kind != TRUE_LABELS
         if case.group == ALONE:
@@ -104,6 +111,8 @@ def methods_of(weights: Mapping[str, Path], chosen: Sequence[str] = ()) -> tuple
     warm += [Method(name, NETWORK, path, main=name == own) for name, path in weights.items()]
     if own is not None:
         warm.append(Method(own + NO_TARGETS, NETWORK, weights[own], targets=False))
+        warm += [replace(m, name=m.name + CALIBRATED, calibrated=True) for m in warm
+                 if m.targets and (m.main or m.kind == TRUE_LABELS)]  # fmt: skip
     known = {
         method.name: method
         for one in warm
@@ -138,6 +147,7 @@ def run_method(method: Method, task: Task, on_frame: Callable[[], None]) -> None
         on_frame=lambda frame, found: on_frame(),
         begun=None if method.cold else _begun(task.clean),
         segmenter=_segmenter(method),
+        body=BodyConfig("calibrated" if method.calibrated else "template"),
     )
 
 
@@ -147,7 +157,7 @@ def _begun(clean: Case) -> tuple[Frame, Float[ndarray, "j 3"]]:
     In [Wan19] every tracker has the right pose to begin with, too. The person's size is estimated
     from that frame.
     """
-    names, joints = read_reference_joints(clean.sequence / "reference_joints.csv")
+    names, joints = read_reference_joints(clean.sequence / REFERENCE_FILE)
     first = open_sequence(clean.sequence).frame(0)
     known = np.full((len(JOINT_NAMES), 3), np.nan)
     for name, place in zip(names, joints[0], strict=True):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from kintrack.bench.cases import GAPS, OBJECTS, REAL, ROOM, SCENE
-from kintrack.bench.methods import COLD, GEOMETRY, RGB, TRUE_LABELS
+from kintrack.bench.methods import CALIBRATED, COLD, GEOMETRY, RGB, TRUE_LABELS
 from kintrack.bench.segmentation.tables import Grid
 from kintrack.bench.tables import LOCK_FRAMES, RECOVER_FRAMES, within
 
@@ -54,13 +54,17 @@ def targets_grid(content: dict[str, Any]) -> Grid:
 
 
 def targets(content: dict[str, Any]) -> list[Target]:
-    """The targets of the synthetic recordings in rooms, of real people and of full scenes."""
+    """The targets of the synthetic recordings in rooms, of real people and of full scenes.
+
+    Where the person was calibrated, as `kintrack fit` does, that is what counts.
+    """
     scores, scenes = content["scores"], content["scenes"]
-    own = next((name for name in scores if name.removesuffix(COLD) not in OTHERS), None)
+    names = [name.removesuffix(COLD).removesuffix(CALIBRATED) for name in scores]
+    own = next((name for name in names if name not in OTHERS), None)
     if own is None:
         return []
-    own = own.removesuffix(COLD)
     room, real = (scores.get(own, {}).get(group, {}) for group in (ROOM, REAL))
+    room = room | scores.get(own + CALIBRATED, {}).get(ROOM, {})
     cold = scores.get(own + COLD, {}).get(ROOM, {})
     out = []
     for condition in OBJECTS:
@@ -96,7 +100,7 @@ def targets(content: dict[str, Any]) -> list[Target]:
     out.append(Target(says, max(filter(None, worst), default=None), 2.0, False, "cm"))
     least = min((100.0 * found["status"]["tracking"] for found in composed), default=None)
     out.append(Target("the same, frames tracking, worst condition", least, 97.0, True, "%"))
-    mine = scenes.get(own + COLD, {})
+    mine = scenes.get(own + CALIBRATED + COLD) or scenes.get(own + COLD, {})
     for name, limit in PCK.items():
         pck = mine.get(name, {}).get("pck")
         says = f"{name} from a cold start, PCK@0.2"

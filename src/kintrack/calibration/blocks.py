@@ -15,6 +15,7 @@ from kintrack.association.observation import Observation
 from kintrack.association.silhouette import outside_pairs, silhouette
 from kintrack.association.window import associate
 from kintrack.body import BodyState, run_kinematics
+from kintrack.calibration.config import BundleConfig
 from kintrack.config import TrackerConfig
 from kintrack.geometry import invert_rigid, transform_points, tukey_weights
 from kintrack.human import Human
@@ -34,39 +35,6 @@ class Snapshot:
     """Pose."""
     T_world_camera: Float[ndarray, "4 4"]
     """Camera pose."""
-
-
-@dataclass(frozen=True)
-class BundleConfig:
-    """How a shape is fitted."""
-
-    rounds: int = 24
-    """Associations at most."""
-    first_gate_m: float = 0.15
-    """Largest distance between a point and its vertex in the first round [m]."""
-    last_gate_m: float = 0.08
-    """The same in the last round [m]."""
-    point_weight: float = 0.01
-    """Weight of point-to-point against point-to-plane: little, for it holds lengths back."""
-    silhouette_weight: float = 0.5
-    """Weight of skin outside the silhouette against a surface pair; a sensor that loses rims makes
-    people small where this is large."""
-    noise_m: float = 0.005
-    """Standard deviation of depth and association, folds left out [m]."""
-    outside: float = 1.5
-    """How much wider residuals may be where the surface lies outside the skin than within."""
-    pixel_pairs: int = 2000
-    """About how many observed pixels look for their vertex. They outnumber the vertices that look
-    for a pixel, which find none beyond the end of what was seen and make the person small."""
-    correlation: float = 48.0
-    """How many pairs carry the information of one independent pair; folds stay from frame to frame,
-    so more than while tracking."""
-    inflation: float = 1.5
-    """Covariance over what the pairs say, measured on training people."""
-    damping: float = 1e-3
-    """Levenberg damping, relative to the diagonal."""
-    tolerance: float = 0.01
-    """Stop when no coefficient moves by more of its standard deviation."""
 
 
 @dataclass(frozen=True)

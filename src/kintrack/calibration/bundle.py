@@ -7,6 +7,11 @@ pose priors, plus 0.5 |(b - mean) / sigma|^2 over shape and clothes. Its Gauss-N
 arrow: one block per pose, bordered by the shape. The poses are eliminated (Schur complement), the
 shape is solved within its bounds, and each pose follows within its hinge limits [Triggs et al.,
 Bundle adjustment, 1999, section 6.1].
+
+The pairs say less than their number suggests, by a factor c = inflation (rms / usual_rms)^4: with
+H_seen the matrix of all frames, poses eliminated, and H_known that of prior and measurements, the
+covariance is (H_seen / c + H_known)^-1. In the fit itself a measurement weighs c-fold against the
+pairs for the same reason; the prior does not, for it would hold unusual people back.
 """
 
 from __future__ import annotations
@@ -19,7 +24,8 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.linalg import cho_factor, cho_solve
 
-from kintrack.calibration.blocks import Blocks, BundleConfig, Snapshot, blocks_of
+from kintrack.calibration.blocks import Blocks, Snapshot, blocks_of
+from kintrack.calibration.config import BundleConfig
 from kintrack.config import TrackerConfig
 from kintrack.human import RESTING_DEG, Human, posed, prior_sigma
 from kintrack.residuals.prior import diagonal_prior
@@ -110,7 +116,7 @@ def solve_bundle(
             blocks_of(space, person, q, snapshot, rest, folds, float(gate_m), tracker, config)
             for q, snapshot in zip(qs, snapshots, strict=True)
         ]
-        H, g = _known(b, prior, measurements)
+        H, g = _known(b, prior, measurements, _doubt(frames, config))
         H, g = _without_poses(H, g, frames)
         step = bounded_step(H, g, prior.lower - b, prior.upper - b)
         b = b + step
@@ -121,11 +127,12 @@ def solve_bundle(
         small = (np.abs(step) < config.tolerance * prior.sigma).all()
         if small and gate_m == config.last_gate_m:
             break
-    H, g = _known(b, prior, measurements)
-    H, _ = _without_poses(H, g, frames)
+    none = np.zeros_like(b)
+    seen, _ = _without_poses(np.diag(none), none, frames)
+    known, _ = _known(b, prior, measurements)
     return Bundle(
         b,
-        config.inflation * np.linalg.inv(H),
+        np.linalg.inv(seen / _doubt(frames, config) + known),
         np.array(qs),
         np.array([frame.rms_m for frame in frames]),
         sum(frame.inliers for frame in frames),
@@ -133,15 +140,23 @@ def solve_bundle(
 
 
 def _known(
-    b: ndarray, prior: Gaussian, measurements: Sequence[Measurement]
+    b: ndarray, prior: Gaussian, measurements: Sequence[Measurement], measured: float = 1.0
 ) -> tuple[ndarray, ndarray]:
-    """Matrix and gradient of prior and measurements."""
+    """Matrix and gradient of prior and measurements, the latter `measured` times as heavy."""
     H = np.diag(prior.sigma**-2.0)
     g = (b - prior.mean) / prior.sigma**2
     for m in measurements:
-        H = H + np.outer(m.gradient, m.gradient) / m.sigma**2
-        g = g + m.gradient * (m.gradient @ b - m.value) / m.sigma**2
+        weight = measured / m.sigma**2
+        H = H + weight * np.outer(m.gradient, m.gradient)
+        g = g + weight * m.gradient * (m.gradient @ b - m.value)
     return H, g
+
+
+def _doubt(frames: Sequence[Blocks], config: BundleConfig) -> float:
+    """By how much the pairs say less than their number suggests: c of the module's docstring."""
+    squares = [frame.rms_m**2 for frame in frames if np.isfinite(frame.rms_m)]
+    ratio = np.mean(squares) / config.usual_rms_m**2 if squares else np.inf
+    return config.inflation * float(np.clip(ratio, 1e-3, 1e3)) ** 2
 
 
 def _without_poses(H: ndarray, g: ndarray, frames: Sequence[Blocks]) -> tuple[ndarray, ndarray]:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Collects frames while they pass, keeps the varied ones, and says who the person is.
 
-A tracker calls `add` for every frame that it is sure of, and `result` once `ready` says so.
+Whoever tracks calls `add` for every frame that he is sure of, and `result` at the end.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -16,15 +16,16 @@ from threadpoolctl import threadpool_limits
 
 from kintrack.association.observation import Observation
 from kintrack.body import run_kinematics
-from kintrack.calibration.blocks import BundleConfig, Snapshot
+from kintrack.calibration.blocks import Snapshot
 from kintrack.calibration.bundle import Bundle, Gaussian, Measurement, solve_bundle
 from kintrack.calibration.clothing import REGIONS, THICKEST_M, dressed_space, fold_sigma
+from kintrack.calibration.config import CalibrationConfig
 from kintrack.calibration.errors import CalibrationError
 from kintrack.calibration.measures import Length, height, measured
 from kintrack.calibration.person import Person
 from kintrack.calibration.selection import spread, varied
 from kintrack.calibration.verdict import LIMITS, problems_of
-from kintrack.config import TrackerConfig, check_bounds
+from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
 from kintrack.human import Human
@@ -35,34 +36,17 @@ LEADING = 0.01
 others also take up what clothes do."""
 
 
-@dataclass(frozen=True)
-class CalibrationConfig:
-    """How a person is calibrated."""
+def check_stated(height_m: float | None) -> None:
+    """Pass if somebody may be as tall as stated [m].
 
-    frames: int = 12
-    """Frames used at most."""
-    pool: int = 36
-    """Frames kept to choose from while a recording passes."""
-    shape_sigma: float = 1.2
-    """Standard deviation of each coefficient between people; 1 is the population's own."""
-    shape_limit: float = 4.0
-    """Largest coefficient."""
-    stated_sigma_m: float = 0.01
-    """How well a stated height is known [m]."""
-    bundle: BundleConfig = field(default_factory=BundleConfig)
-    """The fit."""
-
-    def __post_init__(self) -> None:
-        check_bounds(
-            self,
-            frames=(1, 100),
-            pool=(1, 1000),
-            shape_sigma=(0.1, 10),
-            shape_limit=(0.5, 5),
-            stated_sigma_m=(1e-3, 0.2),
+    Raises:
+        CalibrationError: if not.
+    """
+    low, high = LIMITS.height_m
+    if height_m is not None and not low <= height_m <= high:
+        raise CalibrationError(
+            f"stated height {height_m!r} m: adults of {low} to {high} m are allowed"
         )
-        if self.pool < self.frames:
-            raise CalibrationError(f"pool = {self.pool}: at least frames = {self.frames} is needed")
 
 
 @dataclass(frozen=True)
@@ -102,11 +86,7 @@ class Calibrator:
         Raises:
             CalibrationError: if nobody is as tall as stated.
         """
-        low, high = LIMITS.height_m
-        if stated_height_m is not None and not low <= stated_height_m <= high:
-            raise CalibrationError(
-                f"stated height {stated_height_m!r} m: adults of {low} to {high} m are allowed"
-            )
+        check_stated(stated_height_m)
         self.human = human
         self.T_world_camera = T_world_camera
         self.config = CalibrationConfig() if config is None else config
@@ -131,12 +111,12 @@ class Calibrator:
             kept = self._varied(self.config.pool - self.config.pool // 4)
             self.candidates = [self.candidates[i] for i in kept]
 
-    def ready(self, spread_m: float = 0.05) -> bool:
-        """True once there are enough frames and they differ by `spread_m` on average [m]."""
-        if len(self.candidates) < self.config.frames:
-            return False
+    def spread_m(self) -> float:
+        """How much the frames that would be used differ on average [m]; 0 if there are none."""
+        if not self.candidates:
+            return 0.0
         joints = np.stack([c.joints_m for c in self.candidates])
-        return spread(joints[self._varied(self.config.frames)]) >= spread_m
+        return spread(joints[self._varied(self.config.frames)])
 
     def result(self) -> Person:
         """The person, or the template with the reasons why.

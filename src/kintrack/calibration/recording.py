@@ -6,24 +6,25 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from kintrack.association.observation import observe, within
+from kintrack.association.observation import Observation, box_around, observe, within
 from kintrack.body import run_kinematics
-from kintrack.calibration.calibrator import CalibrationConfig, Calibrator
+from kintrack.calibration.calibrator import Calibrator
+from kintrack.calibration.config import CalibrationConfig
 from kintrack.calibration.person import Person
 from kintrack.calibration.selection import varied
 from kintrack.config import TrackerConfig
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
 from kintrack.human import Human
 from kintrack.result import Track
-from kintrack.segmenter import Segmenter, checked_labels
-from kintrack.sequence.frame import SequenceReader
+from kintrack.segmenter import Segmenter, checked_labels, region_of
+from kintrack.sequence.frame import Frame, SequenceReader
 from kintrack.skin import skinned_vertices
 
 MARGIN_M = 0.12
-"""Without labels, points further than this from the tracked body's box are not the person's [m]."""
+"""Points further than this from the tracked body's box are not the person's [m]."""
 
 
 def calibrate_recording(
@@ -57,7 +58,6 @@ def calibrate_recording(
         CalibrationError: if no frame is tracked or the stated height is impossible.
     """
     calibrator = Calibrator(human, T_world_camera, config, tracker, stated_height_m)
-    a = calibrator.tracker.association
     good = np.flatnonzero(track.status == "tracking")
     seen = track.joint_visible[good].mean(axis=1)
     wanted = varied(track.joint_positions_camera_m[good], seen, calibrator.config.frames)
@@ -66,11 +66,34 @@ def calibrate_recording(
         on_frame(frame.index)
         if frame.problem is not None or frame.depth_m is None:
             continue
-        labels = None if segmenter is None else checked_labels(segmenter, frame)
-        observation = observe(frame, a.max_width_px, a.background_share, labels)
-        q = track.q[good[n]]
-        skin = skinned_vertices(run_kinematics(human.body, q), human.skin)
-        seen_from = transform_points(invert_rigid(T_world_camera), skin)
-        box = np.stack([seen_from.min(axis=0) - MARGIN_M, seen_from.max(axis=0) + MARGIN_M])
-        calibrator.add(frame.index, within(observation, box), q, float(seen[n]))
+        labels, q = None, track.q[good[n]]
+        if segmenter is not None:
+            where = region_of(track.joint_positions_camera_m[good[n]], frame.camera)
+            labels = checked_labels(segmenter, frame, where)
+        shown = person_in(frame, q, human, T_world_camera, labels, calibrator.tracker)
+        calibrator.add(frame.index, shown, q, float(seen[n]))
     return calibrator.result()
+
+
+def person_in(
+    frame: Frame,
+    q: Float[ndarray, " nq"],
+    human: Human,
+    T_world_camera: Float[ndarray, "4 4"],
+    labels: UInt8[ndarray, "r c"] | None,
+    tracker: TrackerConfig,
+) -> Observation:
+    """What a frame shows of the person: her labels, or without labels everything, near her pose.
+
+    Args:
+        frame: A good frame.
+        q: Her pose in it.
+        human: Her body.
+        T_world_camera: Camera pose.
+        labels: The frame's labels; None if it is not labelled.
+        tracker: How a frame is observed.
+    """
+    a = tracker.association
+    skin = skinned_vertices(run_kinematics(human.body, q), human.skin)
+    box = box_around(transform_points(invert_rigid(T_world_camera), skin), MARGIN_M)
+    return within(observe(frame, a.max_width_px, a.background_share, labels), box)

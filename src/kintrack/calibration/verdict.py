@@ -18,13 +18,13 @@ class Limits(NamedTuple):
     """Fewer cannot be checked against each other."""
     least_spread_m: float = 0.025
     """Frames that differ less on average are one frame [m]."""
-    height_sigma_m: float = 0.03
+    height_sigma_m: float = 0.05
     """Doubt about the height beyond which the template is no worse [m]."""
-    limb_share: float = 0.06
+    limb_share: float = 0.09
     """Doubt about a limb, as a share of its length."""
     rms_m: float = 0.025
     """Distance of the surface beyond which it is not the person's [m]."""
-    conflict: float = 4.0
+    conflict: float = 3.0
     """Standard deviations by which a stated height may differ from what the frames say."""
 
 
@@ -52,11 +52,8 @@ def problems_of(
         found.append(
             f"{len(person.frames)} usable frames; at least {limits.least_frames} are needed"
         )
-    elif person.spread_m < limits.least_spread_m:
-        found.append(
-            f"the frames differ by {1e3 * person.spread_m:.0f} mm; "
-            f"at least {1e3 * limits.least_spread_m:.0f} mm are needed: move arms and legs, turn"
-        )
+    elif (alike := too_alike(person.spread_m, limits)) is not None:
+        found.append(alike)
     if not low <= tall.value_m <= high:
         found.append(f"a height of {tall.value_m:.2f} m; adults of {low} to {high} m are known")
     elif at_limit:
@@ -85,3 +82,13 @@ def problems_of(
                 f"{alone.value_m:.3f} ± {alone.sigma_m:.3f} m"
             )
     return tuple(found)
+
+
+def too_alike(spread_m: float, limits: Limits = LIMITS) -> str | None:
+    """Why frames that differ so much on average [m] are not enough; None if they are."""
+    if spread_m >= limits.least_spread_m:
+        return None
+    return (
+        f"the frames differ by {1e3 * spread_m:.0f} mm; "
+        f"at least {1e3 * limits.least_spread_m:.0f} mm are needed: move arms and legs, turn"
+    )

@@ -7,22 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from kintrack.calibration.calibrator import CalibrationConfig, Calibrator
-from kintrack.calibration.person import Person, write_person
-from kintrack.calibration.recording import calibrate_recording
+from kintrack.calibration.config import BodyConfig, CalibrationConfig
 from kintrack.commands.console import FitProgress, console
 from kintrack.commands.recording import Recording
 from kintrack.commands.segmenting import Segmentation
 from kintrack.config import TrackerConfig
-from kintrack.fit import fit_sequence, load_person
-from kintrack.geometry import camera_pose
-from kintrack.human import load_human
-from kintrack.modelling.personal import write_personal_model
-from kintrack.result import TRACK_FILE, Track, make_result_folder
+
+if TYPE_CHECKING:
+    from kintrack.calibration.person import Person
 
 
 @dataclass(frozen=True)
@@ -52,7 +48,15 @@ class Calibrate:
 
     def run(self) -> None:
         """Track, choose frames, calibrate; say what was found and how sure it is."""
-        Calibrator(load_human(), stated_height_m=self.height_m)
+        from kintrack.calibration.calibrator import check_stated
+        from kintrack.calibration.person import write_person
+        from kintrack.calibration.recording import calibrate_recording
+        from kintrack.fit import fit_sequence, load_person
+        from kintrack.geometry import camera_pose
+        from kintrack.modelling.personal import write_personal_model
+        from kintrack.result import TRACK_FILE, Track, make_result_folder
+
+        check_stated(self.height_m)
         sequence, segmenter = self.recording.open(self.sequence), self.segmentation.segmenter()
         make_result_folder(self.output.parent)
         with TemporaryDirectory() as scratch:
@@ -66,6 +70,7 @@ class Calibrate:
                         T_world_camera=camera_pose(self.recording.camera_pitch_deg),
                         on_frame=progress,
                         segmenter=segmenter,
+                        body=BodyConfig("template"),
                     )
             human, T_world_camera = load_person(folder)
             person = calibrate_recording(

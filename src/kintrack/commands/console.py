@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import (
@@ -15,8 +16,9 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from kintrack.result import FrameResult
-from kintrack.sequence.frame import Frame
+if TYPE_CHECKING:
+    from kintrack.result import FrameResult
+    from kintrack.sequence.frame import Frame
 
 console = Console()
 errors = Console(stderr=True, soft_wrap=True)
@@ -46,11 +48,11 @@ class FitProgress:
         self._bar.stop()
 
     def __call__(self, frame: Frame, result: FrameResult) -> None:
-        """Count a frame."""
+        """Count a frame; one that is fitted again moves the bar back."""
         self._done += 1
         fps = self._done / (time.perf_counter() - self._began)
         note = f"{fps:.0f} fps  {1e3 * result.residual_rms_m:.0f} mm  {result.status}"
-        self._bar.update(self._task, completed=self._done, note=note)
+        self._bar.update(self._task, completed=frame.index + 1, note=note)
 
 
 class StepProgress:

@@ -7,11 +7,6 @@ import webbrowser
 from dataclasses import dataclass
 from pathlib import Path
 
-from kintrack.commands.evaluate import Evaluate
-from kintrack.commands.fit import Fit
-from kintrack.sequence import open_sequence
-from kintrack.strip import write_strip
-
 
 @dataclass(frozen=True)
 class Demo:
@@ -24,6 +19,11 @@ class Demo:
 
     def run(self) -> None:
         """Fit, evaluate, show."""
+        from kintrack.commands.evaluate import Evaluate
+        from kintrack.commands.fit import Fit
+        from kintrack.sequence import open_sequence
+        from kintrack.strip import write_strip
+
         recording = Path(__file__).parents[1] / "demo"
         page = self.output / "track.html"
         Fit(

@@ -9,7 +9,6 @@ from pathlib import Path
 import tyro
 
 from kintrack.commands.console import console
-from kintrack.evaluate import evaluate, print_evaluation, write_evaluation
 
 
 @dataclass(frozen=True)
@@ -27,6 +26,8 @@ class Evaluate:
 
     def run(self) -> None:
         """Print the table, write the JSON and the plot."""
+        from kintrack.evaluation import evaluate, print_evaluation, write_evaluation
+
         folder = self.output or (self.result if self.result.is_dir() else self.result.parent)
         evaluation = evaluate(self.result, self.reference, reference_is_truth=self.truth)
         write_evaluation(evaluation, folder)

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from kintrack.sequence import SequenceReader, open_sequence
+if TYPE_CHECKING:
+    from kintrack.sequence import SequenceReader
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,8 @@ class Recording:
 
     def open(self, path: Path) -> SequenceReader:
         """The recording at a path."""
+        from kintrack.sequence import open_sequence
+
         return open_sequence(
             path,
             format=self.format,

@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from kintrack.segmenter import Segmenter
+if TYPE_CHECKING:
+    from kintrack.segmenter import Segmenter
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import base64
 from dataclasses import dataclass
 from pathlib import Path
 
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from kintrack.errors import ResultError
@@ -72,6 +72,7 @@ class HtmlRecorder:
         joint_positions_camera: Float[ndarray, "j 3"] | None,
         status: str,
         text: str = "",
+        vertex_colors: UInt8[ndarray, "v 3"] | None = None,
     ) -> None:
         """Take one frame, later than those before.
 
@@ -82,6 +83,7 @@ class HtmlRecorder:
                 hides them.
             status: One of the statuses of a `FrameResult`.
             text: Anything else worth a line.
+            vertex_colors: R G B of the skin; those of the parts if never given.
         """
         self._camera = frame.camera
         self._taken += 1
@@ -95,6 +97,7 @@ class HtmlRecorder:
             text,
             self._T_world_camera,
             MOST_POINTS,
+            vertex_colors,
         )
         self._kept.append(_Kept(frame.timestamp_s, base64.b64encode(packed).decode()))
         while len(self._kept) > 1 and sum(len(k.data) for k in self._kept) > self._largest_bytes:

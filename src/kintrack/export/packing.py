@@ -2,8 +2,9 @@
 """A person and a point cloud as the few bytes that `scene.js` shows, and the page around it.
 
 A packed frame is little-endian: uint32 length of a JSON header, the header, then int16 millimetres
-in the world frame, x y z of every vertex, joint and point, then uint8 R G B of every point. Half a
-millimetre is lost, and what lies beyond 32 m is clipped.
+in the world frame, x y z of every vertex, joint and point, then uint8 R G B of every point and,
+where the skin is not coloured by part, of every vertex. Half a millimetre is lost, and what lies
+beyond 32 m is clipped.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from string import Template
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
 from kintrack.errors import KintrackError
@@ -107,6 +108,7 @@ def pack_frame(
     text: str,
     T_world_camera: Float[ndarray, "4 4"],
     most_points: int,
+    vertex_colors: UInt8[ndarray, "v 3"] | None = None,
 ) -> bytes:
     """One frame for `scene.js`.
 
@@ -119,6 +121,7 @@ def pack_frame(
         text: Anything else worth a line.
         T_world_camera: The camera's place in the world.
         most_points: Largest number of points.
+        vertex_colors: R G B of the skin; the last ones given, at first those of the parts, if None.
 
     Returns:
         The bytes.
@@ -133,11 +136,13 @@ def pack_frame(
         "vertices": len(vertices),
         "joints": len(joints),
         "points": len(points),
+        "vertex_colors": 0 if vertex_colors is None else len(vertex_colors),
     }
     head = json.dumps(header).encode()
     head += b" " * (len(head) % 2)
     blocks = [_millimetres(transform_points(T_world_camera, x)) for x in (vertices, joints, points)]
-    return b"".join([len(head).to_bytes(4, "little"), head, *blocks, colors.tobytes()])
+    blocks += [colors.tobytes(), b"" if vertex_colors is None else vertex_colors.tobytes()]
+    return b"".join([len(head).to_bytes(4, "little"), head, *blocks])
 
 
 def sample_points(

@@ -105,6 +105,12 @@ class PersonScene {
     const color = this.cloud.geometry.attributes.color;
     color.array.set(new Uint8Array(buffer, start, 3 * header.points));
     color.needsUpdate = true;
+    if (header.vertex_colors > 0) {
+      const paint = this.skin.geometry.attributes.color;
+      start += 3 * header.points;
+      paint.array.set(new Uint8Array(buffer, start, 3 * header.vertex_colors));
+      paint.needsUpdate = true;
+    }
     this.viewer.set_dirty();
     return header;
   }

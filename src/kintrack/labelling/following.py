@@ -12,7 +12,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.components import components
-from kintrack.errors import ConfigError
+from kintrack.config import check_bounds
 from kintrack.labelling.room import (
     Plane,
     RoomConfig,
@@ -69,18 +69,17 @@ class ForegroundConfig:
     """Floor, walls and background."""
 
     def __post_init__(self) -> None:
-        for name in ("edge_m", "min_area_m2", "max_area_m2", "min_height_m", "max_height_m",
-                     "max_width_m", "max_distance_m", "min_relief_m",
-                     "max_growth", "reach_m"):  # fmt: skip
-            if not 0 < getattr(self, name) <= 100:
-                raise ConfigError(f"ForegroundConfig.{name} = {getattr(self, name)!r}: 0 to 100")
-        for name in ("min_moving", "min_stirring", "min_free", "min_overlap"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ConfigError(f"ForegroundConfig.{name} = {getattr(self, name)!r}: 0 to 1")
-        for name, low, high in (("max_width_px", 64, 4096), ("samples", 3, 1000)):
-            if not low <= getattr(self, name) <= high:
-                value = getattr(self, name)
-                raise ConfigError(f"ForegroundConfig.{name} = {value!r}: {low} to {high}")
+        lengths = ("edge_m", "min_area_m2", "max_area_m2", "min_height_m", "max_height_m",
+                   "max_width_m", "max_distance_m", "min_relief_m", "reach_m")  # fmt: skip
+        shares = ("min_moving", "min_stirring", "min_free", "min_overlap")
+        check_bounds(
+            self,
+            max_width_px=(64, 4096),
+            samples=(3, 1000),
+            max_growth=(1, 100),
+            **dict.fromkeys(lengths, (1e-4, 100)),
+            **dict.fromkeys(shares, (0, 1)),
+        )
 
 
 class Scene:

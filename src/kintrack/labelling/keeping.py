@@ -13,14 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.errors import ConfigError
-from kintrack.geometry import LABELS
-from kintrack.joints import JOINT_NAMES
+from kintrack.config import check_bounds
 from kintrack.labelling.measures import Coverage
-from kintrack.metrics import swapped_limbs
 
 REASONS = (
     "not tracking",
@@ -79,15 +76,11 @@ class KeepingConfig:
     """Share of the person's pixels from which a part counts as in view."""
 
     def __post_init__(self) -> None:
-        for name in ("min_explained", "min_supported", "max_hidden", "max_unread", "max_outside",
-                     "max_disputed", "min_part_agreement", "part_share"):  # fmt: skip
-            if not 0 <= getattr(self, name) <= 1:
-                raise ConfigError(f"KeepingConfig.{name} = {getattr(self, name)!r}: 0 to 1")
-        for name in ("min_person_px", "max_rms_m", "max_unexplained_m2", "max_unsupported_m2",
-                     "max_speed_m_s", "max_turn_rad_s", "max_limits"):  # fmt: skip
-            if not 0 <= getattr(self, name) < np.inf:
-                value = getattr(self, name)
-                raise ConfigError(f"KeepingConfig.{name} = {value!r}: 0 or more, finite")
+        shares = ("min_explained", "min_supported", "max_hidden", "max_unread", "max_outside",
+                  "max_disputed", "min_part_agreement", "part_share")  # fmt: skip
+        others = ("min_person_px", "max_rms_m", "max_unexplained_m2", "max_unsupported_m2",
+                  "max_speed_m_s", "max_turn_rad_s", "max_limits")  # fmt: skip
+        check_bounds(self, **dict.fromkeys(shares, (0, 1)), **dict.fromkeys(others, (0, 1e6)))
 
 
 @dataclass(frozen=True)
@@ -194,65 +187,6 @@ def objections(opinion: Opinion, config: KeepingConfig) -> tuple[Reason, ...]:
         f"{opinion.limits} joints at their limits, above {config.max_limits}",
     )
     return tuple(out)
-
-
-def disputes(
-    labels: UInt8[ndarray, "h w"],
-    others: UInt8[ndarray, "h w"],
-    joints_camera: Float[ndarray, "j 3"],
-    joints_other_camera: Float[ndarray, "j 3"],
-    config: KeepingConfig,
-) -> tuple[Reason, ...]:
-    """What two opinions on one frame disagree about.
-
-    Args:
-        labels: Labels by one opinion.
-        others: Labels by the other.
-        joints_camera: Joints of the one, in the order of `JOINT_NAMES` [m].
-        joints_other_camera: Joints of the other [m].
-        config: Thresholds.
-
-    Returns:
-        The reasons; none if they agree.
-    """
-    out = []
-    either = (labels > 0) | (others > 0)
-    total = max(int(either.sum()), 1)
-    disputed = int((labels != others).sum()) / total
-    if disputed > config.max_disputed:
-        text = f"{disputed:.0%} of the person's pixels, above {config.max_disputed:.0%}"
-        out.append(Reason("opinions differ", text))
-    iou = part_iou(labels, others, config.part_share)
-    if np.nanmin(iou, initial=1.0) < config.min_part_agreement:
-        part = int(np.nanargmin(iou))
-        text = f"{LABELS[part]} agrees to {iou[part]:.0%}, below {config.min_part_agreement:.0%}"
-        out.append(Reason("opinions differ", text))
-        swapped = swapped_limbs(JOINT_NAMES, joints_camera[None], joints_other_camera[None])
-        limbs = [limb for limb, found in swapped.items() if found[0]]
-        if limbs:
-            out.append(Reason("swap", f"left and right {', '.join(limbs)} change places"))
-    return tuple(out)
-
-
-def part_iou(
-    labels: UInt8[ndarray, "h w"], others: UInt8[ndarray, "h w"], share: float
-) -> Float[ndarray, " k"]:
-    """Intersection over union per label; NaN for background and for parts hardly in either.
-
-    Args:
-        labels: One label image.
-        others: Another of the same size.
-        share: Share of the person's pixels, of the larger of the two, that a part must have.
-    """
-    k = len(LABELS)
-    table = np.bincount(k * labels.ravel().astype(int) + others.ravel(), minlength=k * k)
-    table = table.reshape(k, k).astype(float)
-    both = np.diag(table)
-    mine, theirs = table.sum(axis=1), table.sum(axis=0)
-    person = max(mine[1:].sum(), theirs[1:].sum(), 1.0)
-    seen = np.maximum(mine, theirs) >= share * person
-    seen[0] = False
-    return np.where(seen, both / np.maximum(mine + theirs - both, 1.0), np.nan)
 
 
 def fastest(

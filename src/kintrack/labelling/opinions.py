@@ -12,12 +12,12 @@ from numpy import ndarray
 
 from kintrack.fit import posed_skin
 from kintrack.joints import JOINT_NAMES
+from kintrack.labelling.disputes import disputes
 from kintrack.labelling.foreground import Foreground, ForegroundConfig
 from kintrack.labelling.keeping import (
     KeepingConfig,
     Opinion,
     Reason,
-    disputes,
     fastest,
     objections,
     turning,

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from kintrack.errors import ConfigError
+from kintrack.config import check_bounds
 from kintrack.geometry import PinholeCamera
 from kintrack.labelling.transfer import NOISE_PER_M
 
@@ -42,15 +42,14 @@ class RoomConfig:
     """Seed of the random triples."""
 
     def __post_init__(self) -> None:
-        for name in ("plane_m", "min_plane_m2", "min_distance_m", "margin_m"):
-            if not 0 < getattr(self, name) <= 100:
-                raise ConfigError(f"RoomConfig.{name} = {getattr(self, name)!r}: above 0 to 100")
-        for name in ("max_beyond", "still_share", "min_share"):
-            if not 0 <= getattr(self, name) <= 1:
-                raise ConfigError(f"RoomConfig.{name} = {getattr(self, name)!r}: 0 to 1")
-        for name, most in (("planes", 20), ("trials", 10_000), ("seed", 2**32 - 1)):
-            if not 0 <= getattr(self, name) <= most:
-                raise ConfigError(f"RoomConfig.{name} = {getattr(self, name)!r}: 0 to {most}")
+        check_bounds(
+            self,
+            planes=(0, 20),
+            trials=(0, 10_000),
+            seed=(0, 2**32 - 1),
+            **dict.fromkeys(("plane_m", "min_plane_m2", "min_distance_m", "margin_m"), (1e-4, 100)),
+            **dict.fromkeys(("max_beyond", "still_share", "min_share"), (0, 1)),
+        )
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, UInt8
 from numba import njit
 from numpy import ndarray
 
-from kintrack.errors import ConfigError
+from kintrack.config import check_bounds
 from kintrack.geometry import LABELS, PinholeCamera
 from kintrack.raster import rasterise
 from kintrack.skin import Skin, vertex_normals
@@ -46,14 +46,16 @@ class TransferConfig:
     """Half width of the window around a hole [px]."""
 
     def __post_init__(self) -> None:
-        for name in ("outside_m", "inside_m", "room_m", "noise_sigmas"):
-            if not 0 <= getattr(self, name) <= 10:
-                raise ConfigError(f"TransferConfig.{name} = {getattr(self, name)!r}: 0 to 10")
-        for name in ("hole_agreement", "hole_support"):
-            if not 0 < getattr(self, name) <= 1:
-                raise ConfigError(f"TransferConfig.{name} = {getattr(self, name)!r}: above 0 to 1")
-        if not 0 <= self.hole_radius_px <= 20:
-            raise ConfigError(f"TransferConfig.hole_radius_px = {self.hole_radius_px!r}: 0 to 20")
+        check_bounds(
+            self,
+            outside_m=(0, 10),
+            inside_m=(0, 10),
+            room_m=(0, 10),
+            noise_sigmas=(0, 10),
+            hole_agreement=(0.01, 1),
+            hole_support=(0.01, 1),
+            hole_radius_px=(0, 20),
+        )
 
 
 @dataclass(frozen=True)

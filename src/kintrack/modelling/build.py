@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from kintrack.errors import ConfigError, ModelError
+from kintrack.config import check_bounds
+from kintrack.errors import ModelError
 from kintrack.modelling.frames import bind_rotations
 from kintrack.modelling.segments import segment_bodies
 from kintrack.modelling.skeleton import links
@@ -35,13 +36,12 @@ class ModelBuildConfig:
     """Seed of the draw."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("tracking_vertices", 500, 10_000),
-            ("people", 50, 100_000),
-            ("shape_coefficients", 1, 30),
-        ):
-            if not low <= getattr(self, name) <= high:
-                raise ConfigError(f"{name} = {getattr(self, name)}: {low} to {high} are allowed")
+        check_bounds(
+            self,
+            tracking_vertices=(500, 10_000),
+            people=(50, 100_000),
+            shape_coefficients=(1, 30),
+        )
 
 
 def build_model(folder: Path, config: ModelBuildConfig, progress=print) -> None:

@@ -13,11 +13,11 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from kintrack.body import BodyState, joint_jacobians
-from kintrack.residuals.linearization import Linearization, Quadratic, quadratic_of
+from kintrack.residuals.linearization import Linearization, Residual
 
 
 @dataclass(frozen=True)
-class JointResidual:
+class JointResidual(Residual):
     """0.5 sum_j |x_j - t_j|^2 / sigma^2."""
 
     joint: Int[ndarray, " n"]
@@ -35,10 +35,6 @@ class JointResidual:
         r = self._residual(state).ravel()
         J = joint_jacobians(state)[self.joint].reshape(len(r), -1)
         return Linearization(r, J, np.full(len(r), self.sigma_m**-2.0))
-
-    def quadratic(self, state: BodyState) -> Quadratic:
-        """J^T W J, J^T W r and the cost."""
-        return quadratic_of(self.linearize(state))
 
     def cost(self, state: BodyState) -> float:
         """Half the weighted sum of squared distances."""

@@ -48,8 +48,8 @@ class Residual(Protocol):
         ...
 
     def quadratic(self, state: BodyState) -> Quadratic:
-        """The same term summed up; equal to `quadratic_of(linearize(state))`."""
-        ...
+        """The same term summed up; a term that has a shorter way to it takes that."""
+        return quadratic_of(self.linearize(state))
 
     def cost(self, state: BodyState) -> float:
         """0.5 sum_i w_i r_i^2 at a state."""

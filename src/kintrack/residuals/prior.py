@@ -16,11 +16,11 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.body import BodyState
-from kintrack.residuals.linearization import Linearization, Quadratic, quadratic_of
+from kintrack.residuals.linearization import Linearization, Residual
 
 
 @dataclass(frozen=True)
-class TangentPrior:
+class TangentPrior(Residual):
     """0.5 |L^T difference(q0, q)|^2; used for the pose prior and for the motion model."""
 
     q0: Float[ndarray, " nq"]
@@ -37,10 +37,6 @@ class TangentPrior:
         dq = pin.dDifference(model, self.q0, state.q, pin.ArgumentPosition.ARG1)
         r = self._residual(state)
         return Linearization(r, self.root.T @ dq, np.ones(len(r)))
-
-    def quadratic(self, state: BodyState) -> Quadratic:
-        """J^T J, J^T r and the cost."""
-        return quadratic_of(self.linearize(state))
 
     def cost(self, state: BodyState) -> float:
         """Half the squared norm of the residual."""

@@ -19,12 +19,12 @@ from kintrack.body import BodyState
 from kintrack.config import SurfaceConfig
 from kintrack.errors import AssociationError
 from kintrack.geometry import huber_weights, robust_scale, tukey_weights
-from kintrack.residuals.linearization import Linearization, Quadratic
+from kintrack.residuals.linearization import Linearization, Quadratic, Residual
 from kintrack.skin import Skin, skinned_vertices, vertex_jacobians
 
 
 @dataclass(frozen=True)
-class SurfaceResidual:
+class SurfaceResidual(Residual):
     """Pairs of vertices and points with frozen normals and weights."""
 
     skin: Skin

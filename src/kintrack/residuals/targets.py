@@ -18,11 +18,11 @@ from numpy import ndarray
 
 from kintrack.body import BodyState, joint_jacobians
 from kintrack.residuals.joints import JointResidual
-from kintrack.residuals.linearization import Linearization, Quadratic, quadratic_of
+from kintrack.residuals.linearization import Linearization, Residual
 
 
 @dataclass(frozen=True)
-class TargetResidual:
+class TargetResidual(Residual):
     """0.5 sum_j max(0, |x_j - t_j| - free)^2 / sigma^2."""
 
     joint: Int[ndarray, " n"]
@@ -61,10 +61,6 @@ class TargetResidual:
         far = share < 1.0
         places = self.places_world + d * share[:, None]
         return JointResidual(self.joint[far], places[far], self.sigma_m)
-
-    def quadratic(self, state: BodyState) -> Quadratic:
-        """J^T W J, J^T W r and the cost."""
-        return quadratic_of(self.linearize(state))
 
     def cost(self, state: BodyState) -> float:
         """Half the weighted sum of squared distances beyond the free one."""

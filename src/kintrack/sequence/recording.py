@@ -15,6 +15,7 @@ from kintrack.errors import FrameError, SequenceError
 from kintrack.geometry import PinholeCamera
 from kintrack.sequence.frame import Frame
 from kintrack.sequence.images import read_color, read_depth, read_labels
+from kintrack.sequence.reference import REFERENCE_FILE
 
 log = logging.getLogger(__name__)
 
@@ -55,7 +56,7 @@ class Recording:
     @property
     def reference_joints_path(self) -> Path | None:
         """`reference_joints.csv` of the recording; None if it has none."""
-        path = self.root / "reference_joints.csv"
+        path = self.root / REFERENCE_FILE
         return path if path.is_file() else None
 
     def __len__(self) -> int:

@@ -15,6 +15,7 @@ from numpy import ndarray
 from kintrack.errors import ResultError
 from kintrack.joints import JOINT_NAMES
 
+REFERENCE_FILE = "reference_joints.csv"
 JOINTS_HEADER = "frame,joint,x_m,y_m,z_m"
 PIXELS_HEADER = "frame,joint,u_px,v_px,visibility"
 

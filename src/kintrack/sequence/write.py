@@ -18,13 +18,18 @@ from kintrack.joints import JOINT_NAMES
 from kintrack.sequence.camera_file import check_positive, write_camera_file
 from kintrack.sequence.images import encode_depth
 from kintrack.sequence.occlusion import OCCLUSION_FILE, OCCLUSION_HEADER, occlusion_row
-from kintrack.sequence.reference import JOINTS_HEADER, check_joint_names, reference_rows
+from kintrack.sequence.reference import (
+    JOINTS_HEADER,
+    REFERENCE_FILE,
+    check_joint_names,
+    reference_rows,
+)
 
 INDEX_HEADER = "# timestamp_s filename\n"
 JPEG_QUALITY = 95
 
 _IMAGES = ("depth/*.png", "rgb/*.jpg", "labels/*.png")
-_TABLES = ("depth.txt", "rgb.txt", "reference_joints.csv", OCCLUSION_FILE, "camera.json")
+_TABLES = ("depth.txt", "rgb.txt", REFERENCE_FILE, OCCLUSION_FILE, "camera.json")
 
 
 class SequenceWriter:
@@ -130,7 +135,7 @@ class SequenceWriter:
             self._append("depth.txt", line, header=INDEX_HEADER)
             if joint_positions_m is not None:
                 rows = reference_rows(self._frames, self.joint_names, joint_positions_m)
-                self._append("reference_joints.csv", rows, header=JOINTS_HEADER + "\n")
+                self._append(REFERENCE_FILE, rows, header=JOINTS_HEADER + "\n")
             if hidden_share is not None:
                 row = occlusion_row(self._frames, hidden_share, hidden_joints)
                 self._append(OCCLUSION_FILE, row, header=OCCLUSION_HEADER)

@@ -3,13 +3,15 @@
 
 from kintrack.start.begun import Start
 from kintrack.start.blob import find_person, start
-from kintrack.start.labelled import LabelledStartConfig, start_at, start_from_labels
-from kintrack.start.sizing import sized
+from kintrack.start.finding import found_by
+from kintrack.start.labelled import start_at, start_from_labels
+from kintrack.start.sizing import in_own_size, sized
 
 __all__ = [
-    "LabelledStartConfig",
     "Start",
     "find_person",
+    "found_by",
+    "in_own_size",
     "sized",
     "start",
     "start_at",

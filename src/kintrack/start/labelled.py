@@ -8,8 +8,6 @@ and labels agree best with what is seen is kept.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
@@ -17,52 +15,19 @@ from numpy import ndarray
 from kintrack.alignment import Fit, View, fit_pose, view_skin
 from kintrack.association.observation import Observation
 from kintrack.body import run_kinematics
-from kintrack.config import TrackerConfig, check_bounds
+from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
 from kintrack.geometry import invert_rigid
 from kintrack.human import Human, prior_sigma
 from kintrack.judge import agreement
-from kintrack.people import PeopleConfig, choose, find_people, only
+from kintrack.labelled_config import LabelledStartConfig
+from kintrack.people import choose, find_people, only
 from kintrack.residuals.prior import diagonal_prior
 from kintrack.sides import settle_sides
 from kintrack.start.begun import Start
 from kintrack.start.evidence import evidence_of
 from kintrack.start.placing import guesses, view_mismatch
 from kintrack.start.postures import postures_of
-
-
-@dataclass(frozen=True)
-class LabelledStartConfig:
-    """A start from labels."""
-
-    people: PeopleConfig = field(default_factory=PeopleConfig)
-    """What parts people."""
-    headings: int = 12
-    """Headings tried, evenly over the circle."""
-    fitted: int = 3
-    """The best so many guesses are fitted."""
-    gate_m: float = 0.25
-    """Largest distance in the first rounds of a fit [m]."""
-    rounds: int = 5
-    """Associations of each fit."""
-    last_rounds: int = 6
-    """Further associations of the best fit."""
-    tilt_rad: float = 0.5
-    """How far the pelvis may lean from where a guess has it [rad]."""
-    side_m: float = 0.04
-    """How far a label's left or right is believed against the geometry [m]."""
-
-    def __post_init__(self) -> None:
-        check_bounds(
-            self,
-            headings=(4, 72),
-            fitted=(1, 20),
-            gate_m=(0.02, 2),
-            rounds=(1, 100),
-            last_rounds=(1, 100),
-            tilt_rad=(0.01, 10),
-            side_m=(0, 10),
-        )
 
 
 def start_from_labels(

@@ -9,6 +9,7 @@ from numpy import ndarray
 
 from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.config import TrackerConfig
+from kintrack.errors import AssociationError
 from kintrack.geometry import invert_rigid
 from kintrack.human import Human, load_human, prior_sigma
 from kintrack.judge import agreement, distance_between
@@ -68,3 +69,25 @@ def sized(
     _, person, fit = refit(shape)
     view = view_skin(person, fit.state, T_camera_world, seen, config)
     return person, Start(fit, agreement(view, seen, config.judge.explained_m), seen)
+
+
+def in_own_size(
+    human: Human,
+    found: Start | None,
+    T_world_camera: Float[ndarray, "4 4"],
+    config: TrackerConfig,
+) -> tuple[Human, Start | None]:
+    """The person of a start in her own size, unless it is known already; None if it does not fit.
+
+    Args:
+        human: Body of the start.
+        found: The start, if there is one.
+        T_world_camera: Camera pose.
+        config: All weights.
+    """
+    if found is None or len(human.shape) or not config.start.shape_coefficients:
+        return human, found
+    try:
+        return sized(human, found, T_world_camera, config)
+    except AssociationError:
+        return human, None

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from kintrack.errors import ResultError
-from kintrack.evaluate import evaluate, plot_evaluation, print_evaluation, write_evaluation
+from kintrack.evaluation import evaluate, plot_evaluation, print_evaluation, write_evaluation
 from kintrack.result import FrameResult, Track
 from kintrack.sequence.reference import write_reference_joints
 

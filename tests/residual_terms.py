@@ -8,6 +8,7 @@ from kintrack.human import RESTING_DEG, posed, prior_sigma
 from kintrack.residuals.joints import JointResidual
 from kintrack.residuals.prior import diagonal_prior, gaussian_prior
 from kintrack.residuals.surface import silhouette_residual, surface_residual
+from kintrack.residuals.targets import TargetResidual
 from kintrack.skin import skinned_vertices, vertex_normals
 
 
@@ -43,4 +44,13 @@ def joints(human, state, rng):
     return JointResidual(rows, places, 0.03)
 
 
-KINDS = (surface, silhouette, pose_prior, motion_prior, joints)
+def targets(human, state, rng):
+    rows = np.array([3, 6, 11, 14])
+    away = rng.normal(size=(4, 3))
+    away *= np.array([0.05, 0.4, 0.3, 0.6])[:, None] / np.linalg.norm(away, axis=1, keepdims=True)
+    return TargetResidual(rows, state.joint_positions_world[rows] + away, 0.1, 0.2)
+
+
+SQUARES = (surface, silhouette, pose_prior, motion_prior, joints)
+"""Terms that the nonlinear programme takes as they are."""
+TERMS = (*SQUARES, targets)
