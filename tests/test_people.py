@@ -76,6 +76,14 @@ def test_a_sliver_beside_a_whole_person_is_not_chosen(scene):
     assert choose(found).distance_m > 3.0
 
 
+def test_somebody_whom_the_side_of_the_image_cuts_is_chosen_only_for_want_of_others(scene):
+    whole, cut = scene.place(at=(3.2, 0.0, 0.0)), scene.place(at=(2.0, 1.05, 0.0))
+    found = find_people(labelled(scene, whole, cut), T)
+    assert sorted(body.cut for body in found) == [False, True]
+    assert choose(found).distance_m > 2.9
+    assert choose(tuple(body for body in found if body.cut)).cut
+
+
 def test_only_one_persons_labels_are_left(scene):
     observation = labelled(scene, scene.place(at=(2.5, -0.6, 0.0)), scene.place(at=(3, 0.7, 0)))
     body = find_people(observation, T)[1]

@@ -22,6 +22,10 @@ from kintrack.components import components
 from kintrack.geometry import LABELS, transform_points
 from kintrack.labelled_config import PeopleConfig
 
+SIDE_SHARE = 0.04
+"""What comes so near to the left or right edge, share of the image, goes on beyond it."""
+CUT_SHARE = 0.4
+"""Somebody whom the edge cuts counts as if only this share of what shows of him did."""
 HEAD, TORSO = LABELS.index("head"), LABELS.index("torso")
 
 
@@ -37,11 +41,18 @@ class Somebody:
     """From the camera [m]."""
     part_area_m2: Float[ndarray, " 7"]
     """What shows of each part, across the line of sight [m^2]."""
+    cut: bool = False
+    """Whether the left or right edge of the image cuts him."""
 
     @property
     def area_m2(self) -> float:
         """What shows of the person, across the line of sight [m^2]."""
         return float(self.part_area_m2.sum())
+
+    @property
+    def weight_m2(self) -> float:
+        """The same, less if the edge of the image cuts the person [m^2]."""
+        return self.area_m2 * (CUT_SHARE if self.cut else 1.0)
 
 
 def find_people(
@@ -92,7 +103,7 @@ def find_people(
             np.concatenate([pieces[m].parts for m in members]),
         )
         distance = float(np.linalg.norm(place - T_world_camera[:3, 3]))
-        people.append(Somebody(mask, place, distance, found))
+        people.append(Somebody(mask, place, distance, found, cut_by_side(mask)))
     return tuple(sorted(people, key=lambda body: -body.area_m2))
 
 
@@ -107,14 +118,22 @@ def choose(
 
     Returns:
         The person, None if there is none. Without a place, whoever shows at least half as much as
-        the one who shows most may be chosen.
+        the one who shows most may be chosen; of somebody who is half outside, that is less.
     """
     if not people:
         return None
     if near_world is not None:
         return min(people, key=lambda body: float(np.linalg.norm(body.place_world - near_world)))
-    least = 0.5 * max(body.area_m2 for body in people)
-    return min((b for b in people if b.area_m2 >= least), key=lambda body: body.distance_m)
+    least = 0.5 * max(body.weight_m2 for body in people)
+    return min((b for b in people if b.weight_m2 >= least), key=lambda body: body.distance_m)
+
+
+def cut_by_side(mask: Bool[ndarray, "h w"]) -> bool:
+    """Whether at least a quarter of a patch's rows reach the left or the right edge."""
+    side = max(1, round(SIDE_SHARE * mask.shape[1]))
+    rows = max(1, int(mask.any(axis=1).sum()))
+    reaching = max(int(part.any(axis=1).sum()) for part in (mask[:, :side], mask[:, -side:]))
+    return 4 * reaching >= rows
 
 
 def only(observation: Observation, body: Somebody) -> Observation:

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from numpy import ndarray
 
+from kintrack.people import CUT_SHARE, cut_by_side
 from kintrack.segmenter import Region
 from segmentation.labels import INPUT_HEIGHT, INPUT_WIDTH
 from segmentation.preprocess import MIN_SIDE_PX, Letterbox
@@ -76,7 +77,7 @@ def window(region: Region, width: int, height: int, focal_px: float) -> Window |
 def region_of_person(
     labels: UInt8[ndarray, "r c"], depth_m: Float[ndarray, "h w"], focal_px: float
 ) -> Region | None:
-    """Where the person is whom labels show most of.
+    """Where the person is whom labels show most of, preferably one whom no side of the image cuts.
 
     Objects in front cut people in pieces: what is labelled near the largest patch counts as hers.
 
@@ -111,9 +112,13 @@ def region_of_person(
 def _largest(
     person: Bool[ndarray, "r c"], cell_m: Float[ndarray, "r c"]
 ) -> Bool[ndarray, "r c"] | None:
-    """The connected patch that covers most square metres."""
+    """The connected patch that covers most square metres, those at the sides counting less."""
     count, patches = cv2.connectedComponents(person.astype(np.uint8))
     areas = np.bincount(patches.ravel(), (cell_m.ravel().astype(float)) ** 2, count)
     areas[0] = 0.0
+    areas[areas < LEAST_AREA_M2] = 0.0
+    for number in np.flatnonzero(areas):
+        if cut_by_side(patches == number):
+            areas[number] *= CUT_SHARE
     best = int(areas.argmax())
-    return np.asarray(patches == best) if areas[best] >= LEAST_AREA_M2 else None
+    return np.asarray(patches == best) if areas[best] > 0 else None

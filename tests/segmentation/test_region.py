@@ -67,6 +67,13 @@ def test_what_an_object_cuts_off_belongs_to_the_person_and_others_do_not():
     assert found.center_px == pytest.approx((4 * 67 + 1.5, 4 * 54.5 + 1.5), abs=6)
 
 
+def test_somebody_at_the_side_of_the_image_counts_less_than_one_who_is_all_in_it():
+    aside = (slice(10, 90), slice(0, 20), 2, 2.0)
+    inside = (slice(30, 70), slice(95, 115), 2, 2.0)
+    assert region_of_person(*scene(aside, inside), FOCAL).center_px[0] > 350
+    assert region_of_person(*scene(aside), FOCAL).center_px[0] < 60
+
+
 def test_a_few_stray_pixels_are_nobody():
     assert region_of_person(*scene((slice(5, 7), slice(5, 7), 1, 1.0)), FOCAL) is None
 
