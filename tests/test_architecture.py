@@ -29,7 +29,7 @@ ROWS = (
     ("alignment",),
     ("occlusion", "judge"),
     ("start",),
-    ("begin",),
+    ("begin", "flips"),
     ("offsets",),
     ("result",),
     ("calibration",),

@@ -84,7 +84,10 @@ frame (real people: at the Kinect's), but for those that start cold, which get n
 by the names of their weights; *true labels* are the ceiling of any network; *geometry alone* knows
 nothing of what is person and what is object. *RGB regression* is MediaPipe Pose 0.10.14 on the
 colour image, each landmark lifted by the depth around its pixel and pushed inward by a fixed
-thickness; a landmark of visibility up to 0.5 or without depth is a missing joint.
+thickness; a landmark of visibility up to 0.5 or without depth is a missing joint. *Calibrated* is
+what `kintrack fit` does by itself: the person's shape and clothes are estimated in the first
+second; the others track the average adult in the size of the first frame, so that they differ by
+labels alone.
 
 Means are over joints with a pose; joints without one count as beyond every threshold, so a method
 that gives up has a good mean and a poor curve. Limbs are shoulders, elbows, wrists, hips, knees and

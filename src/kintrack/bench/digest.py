@@ -14,7 +14,6 @@ from kintrack.rig import model_folder
 
 NOT_TRACKING = (
     "bench",
-    "calibration",
     "cli",
     "commands",
     "demo",
@@ -34,6 +33,7 @@ LABELLING = (
     "labels",
     "networks",
     "preprocess",
+    "region",
     "runtime",
     "tracking",
 )
