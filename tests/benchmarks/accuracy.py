@@ -46,10 +46,15 @@ def main() -> int:
         metavar="NAME=FILE",
         help="networks to compare, the one that ships first",
     )
+    made.add_argument("--methods", nargs="+", default=[], help="some of the methods; all if none")
     made.add_argument("--mediapipe", type=Path, help="Python that has MediaPipe, if not this one")
     arguments = made.parse_args()
     folder = OUT / ("accuracy_quick" if arguments.quick else "accuracy")
-    config = AccuracyConfig(mediapipe=arguments.mediapipe, **(QUICK if arguments.quick else {}))
+    config = AccuracyConfig(
+        mediapipe=arguments.mediapipe,
+        methods=tuple(arguments.methods),
+        **(QUICK if arguments.quick else {}),
+    )
     sources = Sources(arguments.data / "mocap", arguments.data)
     with StepProgress() as progress:
         bench = run_accuracy(folder, named_weights(arguments.weights), config, sources, progress)
