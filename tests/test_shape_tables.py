@@ -20,7 +20,7 @@ def tables(monkeypatch):
 @pytest.fixture
 def row(tables):
     def make(name, body, off_m, sigma_m=0.02, labels="recording", true_m=1.7):
-        limbs = {limb: Length(0.33, 0.015) for limb in LIMBS}
+        limbs = {limb: Length(0.33, 0.016) for limb in LIMBS}
         return importlib.import_module("shape_scoring").Row(
             name, labels, body, "calibrated", 0.03, 1.0, 0.012, Length(1.7 + off_m, sigma_m),
             limbs, true_m, dict.fromkeys(LIMBS, 0.30),
@@ -38,7 +38,7 @@ def test_errors_and_their_doubt_are_told(tables, row):
     assert "| 3.0, 3.0 | 50 % | 10.0, 10.0, 10.0, 10.0 |" in sized
     assert "| 2.0, 2.0 | 50 % |" in known
     doubt = text.split("error over its deviation")[1]
-    assert "| 1.1; 50, 100 % | 2.0; 0, 100 % |" in doubt  # 0.5 and 1.5; 2.0 for every limb
+    assert "| 1.1; 50, 100 % | 1.9; 0, 100 % |" in doubt  # 0.5 and 1.5; 1.9 for every limb
     assert "sized" not in doubt
 
 

@@ -216,6 +216,7 @@ from segmentation.runtime import RuntimeConfig, load_segmenter
 kept = [load_segmenter(Path(sys.argv[1]), RuntimeConfig("openvino")) for _ in range(2)]
 while kept:
     del kept[0]
+signal.signal(signal.SIGINT, signal.default_int_handler)
 try:
     os.kill(os.getpid(), signal.SIGINT)
 except KeyboardInterrupt:

@@ -60,7 +60,7 @@ def test_a_run_leaves_weights_that_load_with_their_facts(whole_run):
     assert weights.config == TINY.network and weights.ranges
     assert weights.training["steps"] == 8 and weights.training["command"] == "kintrack train"
     assert set(LABELS[1:]) <= set(weights.training["validation"])
-    assert weights.training["config"]["augment"]["inserted"] == 0.6
+    assert weights.training["config"]["augment"]["inserted"] == AugmentConfig().inserted
     assert (whole_run / "curves.png").stat().st_size > 5000
 
 
