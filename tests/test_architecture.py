@@ -29,7 +29,7 @@ ROWS = (
     ("alignment",),
     ("occlusion", "judge"),
     ("start",),
-    ("begin", "flips"),
+    ("begin",),
     ("offsets",),
     ("result",),
     ("calibration",),

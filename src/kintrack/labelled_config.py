@@ -168,40 +168,6 @@ class LabelledStartConfig:
 
 
 @dataclass(frozen=True)
-class FlipConfig:
-    """When a swap is believed."""
-
-    memory: float = 0.97
-    """Share of a frame's evidence left one frame later."""
-    enough: int = 30
-    """Vertices of a pair of limbs on its pixels that make a whole frame's evidence."""
-    swapped: float = -8.0
-    """Sum of evidence below which a new start is tried; 1 / (1 - memory) is the most there is."""
-    better: float = 0.9
-    """A new pose is taken if its mismatch is at most this share of the old one's,"""
-    no_worse: float = 1.05
-    """and at most this share of it where sides are left out."""
-    again: int = 20
-    """Frames between two tries."""
-    ages: tuple[int, ...] = (6, 12, 24, 48)
-    """Frames after a start in which it is questioned anyway."""
-    aside_m: float = 0.6
-    """A new pose further from the old one is somebody else's [m]."""
-
-    def __post_init__(self) -> None:
-        check_bounds(
-            self,
-            memory=(0, 0.999),
-            enough=(1, 10_000),
-            swapped=(-1000, 0),
-            better=(0, 1),
-            no_worse=(0, 10),
-            again=(0, 10_000),
-            aside_m=(0, 10),
-        )
-
-
-@dataclass(frozen=True)
 class LabelledConfig:
     """What only a labelled image can be asked."""
 
@@ -211,5 +177,3 @@ class LabelledConfig:
     """Starts and who is a person."""
     whereabouts: WhereaboutsConfig = field(default_factory=WhereaboutsConfig)
     """Who is who."""
-    flips: FlipConfig = field(default_factory=FlipConfig)
-    """When left and right, or front and back, are believed to be swapped."""

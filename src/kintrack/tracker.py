@@ -20,7 +20,6 @@ from kintrack.body import BodyState, run_kinematics
 from kintrack.config import TrackerConfig
 from kintrack.deformation.surface import Surface, followed, met
 from kintrack.errors import AssociationError
-from kintrack.flips import FlipWatch, questioned
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
 from kintrack.human import RESTING_DEG, Human, load_human, posed, prior_sigma
 from kintrack.judge import agreement
@@ -65,7 +64,7 @@ class Tracker:
         self.segmenter = segmenter
         self.labelled = LabelledConfig() if labelled is None else labelled
         self.belief: Belief | None = None
-        self._life, self._where, self._flips = Life(), Whereabouts(), FlipWatch()
+        self._life, self._where = Life(), Whereabouts()
         self._failed_s = -np.inf
         self.surface: Surface | None = None
         self._clock = clock
@@ -168,19 +167,6 @@ class Tracker:
             )
         except AssociationError:
             return self._miss(frame, seen, began)
-        self._flips, other = questioned(
-            self._flips,
-            self._fitted,
-            fit.state,
-            self._view(fit.state, observation),
-            observation,
-            self.T_world_camera,
-            config,
-            self.labelled,
-        )
-        if other is not None:
-            self.belief = None
-            return self._meet_at(frame, self._fitted, other, began)
         return self._report(frame, seen, fit, priors, unseen, hidden, began)
 
     def _observe(self, frame: Frame, awaited: BodyState | None = None) -> Observation:
@@ -224,7 +210,6 @@ class Tracker:
     def _meet_at(self, frame: Frame, person: Human, found: Start, began: float) -> FrameResult:
         """Take a start as the first pose."""
         self._meet(person)
-        self._flips = FlipWatch()
         priors = [diagonal_prior(self._resting, self._prior_sigma)]
         none = np.zeros(person.body.nv, dtype=bool)
         return self._report(frame, found.observation, found.fit, priors, none, none, began)
