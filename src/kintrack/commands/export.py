@@ -19,7 +19,7 @@ class Export:
 
     result: tyro.conf.Positional[Path]
     """Result folder, or the recording that holds it."""
-    output: Path | None = None
+    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """Where to; RESULT/surface if not given."""
     sequence: Path | None = None
     """Recording, for residuals; the folder that holds the result if not given."""

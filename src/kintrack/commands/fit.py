@@ -27,7 +27,7 @@ class Fit:
 
     sequence: tyro.conf.Positional[Path]
     """Folder of the recording."""
-    output: Path | None = None
+    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """Result folder; SEQUENCE/kintrack if not given."""
     video: Path | None = None
     """Also write an overlay video (mp4) here."""
