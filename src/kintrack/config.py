@@ -3,28 +3,12 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
+from kintrack.bounds import check_bounds
 from kintrack.deformation_config import DeformationConfig
 from kintrack.errors import ConfigError
-
-
-def check_bounds(config, **bounds: tuple[float, float]) -> None:
-    """Pass if every named field of a config dataclass lies within its bounds.
-
-    Raises:
-        ConfigError: if one does not, or is no whole number where the field is an int.
-    """
-    whole = {f.name for f in fields(config) if f.type in (int, "int")}
-    for name, (low, high) in bounds.items():
-        value = getattr(config, name)
-        right_kind = name not in whole or isinstance(value, int)
-        if not (right_kind and math.isfinite(value) and low <= value <= high):
-            kind = ", whole numbers only" if name in whole else ""
-            raise ConfigError(
-                f"{type(config).__name__}.{name} = {value!r}: {low:g} to {high:g} are allowed{kind}"
-            )
+from kintrack.rival_config import RivalConfig
 
 
 @dataclass(frozen=True)
@@ -323,3 +307,5 @@ class TrackerConfig:
     """Status."""
     deformation: DeformationConfig = field(default_factory=DeformationConfig)
     """Surface of the clothes."""
+    rival: RivalConfig = field(default_factory=RivalConfig)
+    """Back or front."""

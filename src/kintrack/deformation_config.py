@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
+from kintrack.bounds import check_bounds
 from kintrack.errors import ConfigError
 
 BOUNDS: dict[str, tuple[float, float]] = {
@@ -69,12 +69,4 @@ class DeformationConfig:
                 raise ConfigError(
                     f"DeformationConfig.{name} = {getattr(self, name)!r}: True or False is needed"
                 )
-        whole = {f.name for f in fields(self) if f.type == "int"}
-        for name, (low, high) in BOUNDS.items():
-            value = getattr(self, name)
-            right_kind = name not in whole or isinstance(value, int)
-            if not (right_kind and math.isfinite(value) and low <= value <= high):
-                raise ConfigError(
-                    f"DeformationConfig.{name} = {value!r}: {low:g} to {high:g} are allowed"
-                    + (", whole numbers only" if name in whole else "")
-                )
+        check_bounds(self, **BOUNDS)

@@ -4,17 +4,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from kintrack.body import run_kinematics
-from kintrack.calibration.acquaintance import Acquaintance, Again, Watched
+from kintrack.calibration.acquaintance import Acquaintance, Again
 from kintrack.calibration.config import BodyConfig
 from kintrack.calibration.person import Person, dressed_human, human_of
 from kintrack.config import TrackerConfig
@@ -98,18 +99,16 @@ def fit_sequence(
             make_result_folder(path.parent)
     config = body.applied(TrackerConfig() if config is None else config)
     acquaintance = Acquaintance(body, person, T_world_camera, config)
-    watched = None if segmenter is None else Watched(segmenter)
     while True:
         who = acquaintance.person
         human = None if who is None else human_of(who)
-        tracker = Tracker(config, human, T_world_camera, segmenter=watched, labelled=labelled)
+        tracker = Tracker(config, human, T_world_camera, segmenter=segmenter, labelled=labelled)
         try:
             return _pass(
                 sequence,
                 folder,
                 tracker,
                 acquaintance,
-                watched,
                 outputs,
                 NullViewer() if viewer is None else viewer,
                 on_frame,
@@ -124,7 +123,6 @@ def _pass(
     folder: Path,
     tracker: Tracker,
     acquaintance: Acquaintance,
-    watched: Watched | None,
     outputs: Outputs,
     viewer: Viewer,
     on_frame: Callable[[Frame, FrameResult], None],
@@ -134,8 +132,8 @@ def _pass(
     if begun is not None:
         tracker.begin(*begun)
     T_world_camera, facts = tracker.T_world_camera, asdict(tracker.config)
-    if watched is not None:
-        facts |= {"labelled": asdict(tracker.labelled), "segmenter": watched.name}
+    if tracker.segmenter is not None:
+        facts |= {"labelled": asdict(tracker.labelled), "segmenter": tracker.segmenter.name}
     with ExitStack() as stack:
         writer = stack.enter_context(
             TrackWriter(
@@ -153,12 +151,11 @@ def _pass(
             page = HtmlRecorder(tracker.human.skin, T_world_camera, title=sequence.name)
             stack.callback(page.write, outputs.html)
         shades = None
-        for frame in sequence:
-            result = tracker.step(frame)
+        for frame, result, human, labels in _settled(sequence, tracker):
             writer.append(result)
             worn = acquaintance.clothing_m
-            writer.note(person={"shape": tracker.human.shape, "clothing_m": worn})
-            vertices = posed_skin(tracker.human, result.q, T_world_camera)
+            writer.note(person={"shape": human.shape, "clothing_m": worn})
+            vertices = posed_skin(human, result.q, T_world_camera)
             joints = result.joint_positions_camera_m
             text = caption(result)
             viewer.show(frame, vertices, joints, result.status, text)
@@ -166,7 +163,7 @@ def _pass(
                 page.add(frame, vertices, joints, result.status, text)
             if video:
                 shades = depth_range(frame.depth_m) if shades is None else shades
-                skin = tracker.human.skin
+                skin = human.skin
                 video.write(
                     draw_overlay(
                         frame,
@@ -180,12 +177,36 @@ def _pass(
                     )
                 )
             on_frame(frame, result)
-            labels = None if watched is None else watched.last
-            acquaintance.see(frame, result, tracker.human, labels)
+            acquaintance.see(frame, result, human, labels)
             writer.note(body=acquaintance.told())
         acquaintance.conclude()
         writer.note(body=acquaintance.told())
         return writer.close()
+
+
+class _Tracked(NamedTuple):
+    """A frame, and what was made of it."""
+
+    frame: Frame
+    result: FrameResult
+    human: Human
+    labels: UInt8[ndarray, "r c"] | None
+
+
+def _settled(sequence: SequenceReader, tracker: Tracker) -> Iterator[_Tracked]:
+    """Track every frame, and hold those back whose results may still be amended."""
+    held: list[_Tracked] = []
+    for frame in sequence:
+        result, segmenter = tracker.step(frame), tracker.segmenter
+        labels = None if segmenter is None else segmenter.last
+        held.append(_Tracked(frame, result, tracker.human, labels))
+        amended = tracker.amended
+        for n, better in enumerate(amended, len(held) - len(amended)):
+            held[n] = held[n]._replace(result=better)
+        if not tracker.in_doubt:
+            yield from held
+            held = []
+    yield from held
 
 
 def posed_skin(

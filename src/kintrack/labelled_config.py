@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,43 @@ class Segmenter(Protocol):
         ...
 
 
+class Watched:
+    """A segmenter that remembers the labels of the last frame."""
+
+    def __init__(self, segmenter: Segmenter):
+        """Watch a segmenter."""
+        self._segmenter = segmenter
+        self.last: UInt8[ndarray, "r c"] | None = None
+
+    @property
+    def name(self) -> str:
+        """What the segmenter is."""
+        return self._segmenter.name
+
+    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
+        """What the segmenter says."""
+        self.last = self._segmenter.segment(frame, region)
+        return self.last
+
+
+class Told:
+    """A segmenter that says what another one was last heard to say."""
+
+    def __init__(self, watched: Watched):
+        """Listen to one."""
+        self._watched = watched
+
+    @property
+    def name(self) -> str:
+        """What the other one is."""
+        return self._watched.name
+
+    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
+        """Its last labels, which must be the frame's."""
+        assert self._watched.last is not None
+        return self._watched.last
+
+
 def region_of(points_camera: Float[ndarray, "n 3"], camera: PinholeCamera) -> Region | None:
     """Where somebody is whose joints are known.
 

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
 from kintrack.association.observation import Observation
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from kintrack.geometry import LABELS
 from kintrack.joints import JOINT_NAMES
 

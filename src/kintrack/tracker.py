@@ -4,81 +4,39 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
-from threadpoolctl import ThreadpoolController
 
-from kintrack.alignment import Fit, View, fit_pose, view_skin
+from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.association.observation import Observation, box_around, observe, within
 from kintrack.begin import begin
-from kintrack.belief import Belief, awaited_state, coasted, first, tracking_priors, updated
+from kintrack.belief import awaited_state, coasted, first, tracking_priors, updated
 from kintrack.body import BodyState, run_kinematics
-from kintrack.config import TrackerConfig
-from kintrack.deformation.surface import Surface, followed, met
+from kintrack.deformation.surface import followed
 from kintrack.errors import AssociationError
-from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
-from kintrack.human import RESTING_DEG, Human, load_human, posed, prior_sigma
+from kintrack.geometry import invert_rigid, transform_points
+from kintrack.human import Human
 from kintrack.judge import agreement
-from kintrack.lifecycle import HIDDEN, NOBODY, Life, LifecycleConfig, absent, judged
+from kintrack.lifecycle import HIDDEN, NOBODY, Life, absent, judged
+from kintrack.memory import Memory
 from kintrack.occlusion import hidden_hinges, unseen_hinges
-from kintrack.person import LabelledConfig, geometric_lifecycle, own_pixels, part_pull
-from kintrack.reporting import coasted_result, empty_result, fitted_result, reading_of
+from kintrack.person import own_pixels, part_pull
+from kintrack.reporting import coasted_result, fitted_result, reading_of
 from kintrack.residuals.prior import TangentPrior, diagonal_prior
 from kintrack.result import FrameResult
-from kintrack.segmenter import Segmenter, checked_labels, region_of
+from kintrack.rivals import Duel
+from kintrack.segmenter import Told, checked_labels, region_of
 from kintrack.sequence.frame import Frame
 from kintrack.sides import settle_sides
 from kintrack.solver.gauss_newton import normal_equations
 from kintrack.start import Start, found_by, in_own_size
-from kintrack.whereabouts import Whereabouts
 
 
-class Tracker:
+class Tracker(Memory):
     """Follows one person through the frames of one camera."""
-
-    def __init__(
-        self,
-        config: TrackerConfig | None = None,
-        human: Human | None = None,
-        T_world_camera: Float[ndarray, "4 4"] = T_LEVEL_WORLD_CAMERA,
-        clock: Callable[[str], None] = lambda stage: None,
-        segmenter: Segmenter | None = None,
-        labelled: LabelledConfig | None = None,
-    ):
-        """Set up a tracker that has seen nothing yet.
-
-        Args:
-            config: All weights; the defaults if None.
-            human: Body and skin; the average adult if None.
-            T_world_camera: Camera pose; a level camera if not given.
-            clock: Called after each stage with its name, for benchmarks.
-            segmenter: Labels every frame; None for the geometry alone.
-            labelled: What belongs to labels; the defaults if None.
-        """
-        self.config = TrackerConfig() if config is None else config
-        self.T_world_camera = T_world_camera
-        self.segmenter = segmenter
-        self.labelled = LabelledConfig() if labelled is None else labelled
-        self.belief: Belief | None = None
-        self._life, self._where = Life(), Whereabouts()
-        self._failed_s = -np.inf
-        self.surface: Surface | None = None
-        self._clock = clock
-        self._threads = ThreadpoolController()
-        self._meet(load_human() if human is None else human)
-
-    def _meet(self, human: Human) -> None:
-        """Take this person's body and what belongs to it."""
-        self.surface = met(self.surface, human, self.config.deformation)
-        self.human = self._fitted = human
-        if self.surface is not None:
-            self.human, self._fitted = self.surface.shown(human), self.surface.fitted(human)
-        self._resting = posed(human.body, RESTING_DEG)
-        self._prior_sigma = prior_sigma(human.body, self.config.prior)
 
     def step(self, frame: Frame) -> FrameResult:
         """Fit the body to the next frame.
@@ -87,10 +45,14 @@ class Tracker:
             frame: The next frame in time; one with a problem is skipped.
 
         Returns:
-            Pose, joints, covariances and status.
+            Pose, joints, covariances and status. Who begins to be tracked is followed facing the
+            other way, too, for some frames; if that fits better, it is what is returned, and
+            `amended` has the frames before.
         """
         with self._threads.limit(limits=1, user_api="blas"):
-            return self._step(frame)
+            new, self.amended = self.belief is None, ()
+            result = self._step(frame)
+            return self._settled(frame, result, new) if self.config.rival.most_frames else result
 
     def begin(self, frame: Frame, joints_camera: Float[ndarray, "j 3"]) -> FrameResult:
         """Start from joints that somebody else has found roughly, whatever the fit says of them.
@@ -119,8 +81,29 @@ class Tracker:
             person, sized_start = in_own_size(human, found, T, self.config)
             return self._meet_at(frame, person, sized_start or found, began)
 
+    def _settled(self, frame: Frame, result: FrameResult, new: bool) -> FrameResult:
+        """The frame's result, or the rival's if he stays."""
+        began, human, T = time.perf_counter(), self._met, self.T_world_camera
+        if self._duel is not None:
+            verdict = self._duel.step(frame, self.tracks, self.reading)
+            if verdict.turned:
+                self._become(self._duel.rival)
+                self.amended = tuple(self._duel.results)
+                result = self.amended[-1]
+            self._duel = None if verdict.over else self._duel
+        elif new and self.tracks:
+            told = None if self.segmenter is None else Told(self.segmenter)
+            rival = Tracker(self.config, human, T, segmenter=told, labelled=self.labelled)
+            rival._where = self._where
+            self._duel = Duel.between(result, rival, frame, self.config.rival)
+        else:
+            return result
+        self._clock("rival")
+        spent_ms = 1e3 * (time.perf_counter() - began)
+        return replace(result, milliseconds=result.milliseconds + spent_ms)
+
     def _step(self, frame: Frame) -> FrameResult:
-        began = time.perf_counter()
+        began, self.reading = time.perf_counter(), None
         if frame.problem is not None or frame.depth_m is None:
             return self._nothing(frame, "skipped", began, frame.problem or "no depth")
         config, a, now_s = self.config, self.config.association, frame.timestamp_s
@@ -179,12 +162,6 @@ class Tracker:
         labels = None if self.segmenter is None else checked_labels(self.segmenter, frame, region)
         return observe(frame, a.max_width_px, a.background_share, labels)
 
-    def _lifecycle(self, observation: Observation) -> LifecycleConfig:
-        """When tracking begins and ends."""
-        if observation.labels is None:
-            return geometric_lifecycle(self.config.judge)
-        return self.labelled.lifecycle
-
     def _start(self, frame: Frame, observation: Observation, began: float) -> FrameResult:
         """First frame, or the first after a loss: find the person and fit from several guesses."""
         config, person, machine = self.config, self._fitted, self._lifecycle(observation)
@@ -214,11 +191,6 @@ class Tracker:
         none = np.zeros(person.body.nv, dtype=bool)
         return self._report(frame, found.observation, found.fit, priors, none, none, began)
 
-    def _view(self, state: BodyState, observation: Observation) -> View:
-        """The skin of a state as the camera sees it."""
-        T_camera_world = invert_rigid(self.T_world_camera)
-        return view_skin(self._fitted, state, T_camera_world, observation, self.config)
-
     def _report(
         self,
         frame: Frame,
@@ -240,8 +212,8 @@ class Tracker:
         if last is None:
             self.belief = first(q, covariance, now_s)
         else:
-            reading = reading_of(fit, view, agreed, observation)
-            self._life = judged(self._life, reading, self._lifecycle(observation))
+            self.reading = reading_of(fit, view, agreed, observation)
+            self._life = judged(self._life, self.reading, self._lifecycle(observation))
             new = updated(body, last, q, covariance, unseen, hidden, now_s, config.motion)
             new = replace(new, misses=self._life.bad)
             self.belief = new if self._life.tracks else None
@@ -291,9 +263,3 @@ class Tracker:
             frame, state, self.belief.covariance, T_camera_world, config.confidence, began
         )
         return replace(result, offsets_m=None if self.surface is None else self.surface.offsets_m)
-
-    def _nothing(
-        self, frame: Frame, status: str, began: float, reason: str | None = None
-    ) -> FrameResult:
-        """A result without a pose."""
-        return empty_result(frame, self._fitted.body, status, began, reason)

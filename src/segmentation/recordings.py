@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from kintrack.errors import ConfigError, DatasetError
 from segmentation.dataset import Pictures, Split, everything, split
 from segmentation.errors import WeightsError

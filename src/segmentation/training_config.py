@@ -7,7 +7,7 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from segmentation.architecture import NetworkConfig
 from segmentation.augment.bank import BankConfig
 from segmentation.augment.sample import AugmentConfig

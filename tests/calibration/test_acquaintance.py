@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from kintrack.calibration import acquaintance
-from kintrack.calibration.acquaintance import Acquaintance, Again, Watched
+from kintrack.calibration.acquaintance import Acquaintance, Again
 from kintrack.calibration.config import BodyConfig
 from kintrack.calibration.errors import CalibrationError
 from kintrack.calibration.measures import LIMBS, Length
@@ -15,7 +15,7 @@ from kintrack.config import TrackerConfig
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.human import load_human
 from kintrack.reporting import empty_result
-from kintrack.segmenter import Region
+from kintrack.segmenter import Region, Watched
 from kintrack.sequence.frame import Frame
 
 from .people import CAMERA

@@ -27,7 +27,7 @@ from kintrack.bench.full_scenes import PIXELS_FILE
 from kintrack.bench.gaps import Gap
 from kintrack.bench.inserting import Insertion
 from kintrack.bench.running import Making, run_all
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from kintrack.errors import ConfigError, SequenceError
 from kintrack.sequence import open_sequence
 from synthesis.dataset.build import build_dataset, sequences

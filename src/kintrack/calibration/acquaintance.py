@@ -17,7 +17,6 @@ from kintrack.calibration.person import Person
 from kintrack.config import TrackerConfig
 from kintrack.human import Human
 from kintrack.result import FrameResult
-from kintrack.segmenter import Region, Segmenter
 from kintrack.sequence.frame import Frame
 
 LEAST_TRACKED = 0.95
@@ -28,21 +27,6 @@ MOST_RESIDUAL = 1.1
 
 class Again(Exception):
     """The recording is to be tracked again from its beginning, with another body."""
-
-
-class Watched:
-    """A segmenter that remembers the labels of the last frame."""
-
-    def __init__(self, segmenter: Segmenter):
-        """Watch a segmenter."""
-        self._segmenter = segmenter
-        self.name = segmenter.name
-        self.last: UInt8[ndarray, "r c"] | None = None
-
-    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
-        """What the segmenter says."""
-        self.last = self._segmenter.segment(frame, region)
-        return self.last
 
 
 class Acquaintance:

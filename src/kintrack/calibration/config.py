@@ -6,8 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from kintrack.bounds import check_bounds
 from kintrack.calibration.errors import CalibrationError
-from kintrack.config import TrackerConfig, check_bounds
+from kintrack.config import TrackerConfig
 
 BodyKind = Literal["template", "calibrated", "deformable"]
 """template: the average adult, stature and build sized in the first frame; calibrated: the person's

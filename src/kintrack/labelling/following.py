@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from kintrack.bounds import check_bounds
 from kintrack.components import components
-from kintrack.config import check_bounds
 from kintrack.labelling.room import (
     Plane,
     RoomConfig,

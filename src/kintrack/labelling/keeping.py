@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from kintrack.labelling.measures import Coverage
 
 REASONS = (

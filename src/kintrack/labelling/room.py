@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from kintrack.geometry import PinholeCamera
 from kintrack.labelling.transfer import NOISE_PER_M
 

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, UInt8
 from numba import njit
 from numpy import ndarray
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from kintrack.geometry import LABELS, PinholeCamera
 from kintrack.raster import rasterise
 from kintrack.skin import Skin, vertex_normals

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from kintrack.errors import ModelError
 from kintrack.modelling.frames import bind_rotations
 from kintrack.modelling.segments import segment_bodies

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy import ndarray
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from kintrack.errors import SceneError
 from kintrack.geometry import PinholeCamera
 from segmentation.augment.insertion import Cutouts

@@ -52,7 +52,7 @@ class Cutouts:
 def insert(
     picture: Picture, cutouts: Cutouts, most_hidden: float, rng: np.random.Generator
 ) -> Picture:
-    """Put one cut-out into a picture of a person.
+    """Put one cut-out into a picture, before or beside the person, or anywhere if there is nobody.
 
     Scale, turn, place and depth are drawn; whatever is farther than the cut-out is replaced and
     becomes background. Of some places before the person, one that hides much of her is taken.
@@ -66,11 +66,12 @@ def insert(
     Returns:
         The picture with it, or as it was if no place fits.
     """
-    person = np.flatnonzero(
-        person_of(picture.labels).reshape(-1) & (picture.depth_m > 0).reshape(-1)
-    )
-    if not len(cutouts) or not len(person):
+    reads = picture.depth_m.reshape(-1) > 0
+    if not len(cutouts) or not reads.any():
         return picture
+    person = np.flatnonzero(person_of(picture.labels).reshape(-1) & reads)
+    if not len(person):
+        person = rng.choice(np.flatnonzero(reads), 1)
     depths = np.sort(picture.depth_m.reshape(-1)[person])
     near_m, far_m = float(depths[len(depths) // 20]), float(depths[-1 - len(depths) // 20])
     which = int(rng.integers(len(cutouts)))

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from segmentation.augment.color import recolored
 from segmentation.augment.geometry import Warp, around, cut, draw_around, draw_warp, warped, whole
 from segmentation.augment.insertion import Cutouts, insert, put_behind, without_background
@@ -24,6 +24,8 @@ EMPTY_SHARE = 0.2
 """A picture with readings on less of what is not person has no background."""
 EMPTY_ROOMED = 0.5
 """Chance that a picture without background gets a room."""
+MOST_INSERTED = 3
+"""Objects put into one picture."""
 CROPS = 8
 """Views tried to find one without the person."""
 
@@ -48,7 +50,7 @@ class AugmentConfig:
     """Chance of inserted objects; 0 for the ablation without."""
     most_hidden: float = 0.6
     """Greatest share of the person that one object may hide."""
-    nobody: float = 0.06
+    nobody: float = 0.1
     """Chance of a picture without person."""
     other_room: float = 0.12
     """Chance that the person stands in another room."""
@@ -133,9 +135,9 @@ def changed(
             view = without_background(view)
         elif bank.rooms and chance["room"] < (EMPTY_ROOMED if bare else config.other_room):
             view = put_behind(view, _room(bank, rng, like=view), 0.4, rng)
-        if rng.random() < config.inserted:
-            for _ in range(1 + int(rng.integers(0, 2))):
-                view = insert(view, bank.cutouts, config.most_hidden * rng.uniform(0.3, 1.0), rng)
+    if rng.random() < config.inserted:
+        for _ in range(1 + int(rng.integers(0, MOST_INSERTED))):
+            view = insert(view, bank.cutouts, config.most_hidden * rng.uniform(0.3, 1.0), rng)
     color = view.color
     if chance["color"] < config.depth_only:
         color = None

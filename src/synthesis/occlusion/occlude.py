@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from kintrack.errors import SceneError
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.joints import JOINT_NAMES

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
-from kintrack.config import check_bounds
+from kintrack.bounds import check_bounds
 from kintrack.errors import SceneError
 from kintrack.geometry import PinholeCamera
 from kintrack.raster import rasterise

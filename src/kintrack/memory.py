@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a tracker knows: its settings, the person's body, where she is, and how sure that is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+from threadpoolctl import ThreadpoolController
+
+from kintrack.alignment import View, view_skin
+from kintrack.association.observation import Observation
+from kintrack.belief import Belief
+from kintrack.body import BodyState
+from kintrack.config import TrackerConfig
+from kintrack.deformation.surface import Surface, met
+from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid
+from kintrack.human import RESTING_DEG, Human, load_human, posed, prior_sigma
+from kintrack.lifecycle import Life, LifecycleConfig, Reading
+from kintrack.person import LabelledConfig, geometric_lifecycle
+from kintrack.reporting import empty_result
+from kintrack.result import FrameResult
+from kintrack.rivals import Duel
+from kintrack.segmenter import Segmenter, Watched
+from kintrack.sequence.frame import Frame
+from kintrack.whereabouts import Whereabouts
+
+
+class Memory:
+    """State of a tracker between two frames."""
+
+    def __init__(
+        self,
+        config: TrackerConfig | None = None,
+        human: Human | None = None,
+        T_world_camera: Float[ndarray, "4 4"] = T_LEVEL_WORLD_CAMERA,
+        clock: Callable[[str], None] = lambda stage: None,
+        segmenter: Segmenter | None = None,
+        labelled: LabelledConfig | None = None,
+    ):
+        """Set up a tracker that has seen nothing yet.
+
+        Args:
+            config: All weights; the defaults if None.
+            human: Body and skin; the average adult if None.
+            T_world_camera: Camera pose; a level camera if not given.
+            clock: Called after each stage with its name, for benchmarks.
+            segmenter: Labels every frame; None for the geometry alone.
+            labelled: What belongs to labels; the defaults if None.
+        """
+        self.config = TrackerConfig() if config is None else config
+        self.T_world_camera = T_world_camera
+        self.segmenter = None if segmenter is None else Watched(segmenter)
+        self.labelled = LabelledConfig() if labelled is None else labelled
+        self.belief: Belief | None = None
+        self.reading: Reading | None = None
+        """What the last frame said of the track; None if it was compared with nothing."""
+        self.amended: tuple[FrameResult, ...] = ()
+        """What the last frames should have been, if the last step found its track turned round;
+        that step's own result is the last of them."""
+        self._duel: Duel | None = None
+        self._life, self._where = Life(), Whereabouts()
+        self._failed_s = -np.inf
+        self.surface: Surface | None = None
+        self._clock = clock
+        self._threads = ThreadpoolController()
+        self._meet(load_human() if human is None else human)
+
+    def _meet(self, human: Human) -> None:
+        """Take this person's body and what belongs to it."""
+        self._met = human
+        self.surface = met(self.surface, human, self.config.deformation)
+        self.human = self._fitted = human
+        if self.surface is not None:
+            self.human, self._fitted = self.surface.shown(human), self.surface.fitted(human)
+        self._resting = posed(human.body, RESTING_DEG)
+        self._prior_sigma = prior_sigma(human.body, self.config.prior)
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether the last results may still be `amended`."""
+        return self._duel is not None
+
+    @property
+    def tracks(self) -> bool:
+        """Whether there is a pose to go on from."""
+        return self.belief is not None
+
+    def _become(self, other: Memory) -> None:
+        """Go on from where another tracker is."""
+        self.belief, self.reading, self.surface = other.belief, other.reading, other.surface
+        self.human, self._fitted = other.human, other._fitted
+        self._life, self._where = other._life, other._where
+
+    def _lifecycle(self, observation: Observation) -> LifecycleConfig:
+        """When tracking begins and ends."""
+        if observation.labels is None:
+            return geometric_lifecycle(self.config.judge)
+        return self.labelled.lifecycle
+
+    def _view(self, state: BodyState, observation: Observation) -> View:
+        """The skin of a state as the camera sees it."""
+        T_camera_world = invert_rigid(self.T_world_camera)
+        return view_skin(self._fitted, state, T_camera_world, observation, self.config)
+
+    def _nothing(
+        self, frame: Frame, status: str, began: float, reason: str | None = None
+    ) -> FrameResult:
+        """A result without a pose."""
+        return empty_result(frame, self._fitted.body, status, began, reason)

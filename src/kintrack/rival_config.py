@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every number of the duel between a new track and its rival, with its unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kintrack.bounds import check_bounds
+
+
+@dataclass(frozen=True)
+class RivalConfig:
+    """How long somebody who faces the other way is followed beside a new track."""
+
+    least_frames: int = 8
+    """Frames in which both are judged before one of them wins."""
+    most_frames: int = 20
+    """After so many frames it is over; 0 for no rival."""
+    wins: float = 0.85
+    """The rival stays if its doubt is smaller than the track's by this factor."""
+    wins_late: float = 0.95
+    """The same once it is over."""
+    loses: float = 1.3
+    """It goes if its doubt is larger by this factor."""
+    unexplained_m: float = 0.05
+    """How far off a point counts that the skin does not explain [m]."""
+
+    def __post_init__(self) -> None:
+        check_bounds(
+            self,
+            least_frames=(1, 10_000),
+            most_frames=(0, 10_000),
+            wins=(0.0, 1.0),
+            wins_late=(0.0, 1.0),
+            loses=(1.0, 1e6),
+            unexplained_m=(0.0, 1.0),
+        )
