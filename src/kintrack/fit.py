@@ -196,16 +196,20 @@ class _Tracked(NamedTuple):
 def _settled(sequence: SequenceReader, tracker: Tracker) -> Iterator[_Tracked]:
     """Track every frame, and hold those back whose results may still be amended."""
     held: list[_Tracked] = []
-    for frame in sequence:
-        result, segmenter = tracker.step(frame), tracker.segmenter
-        labels = None if segmenter is None else segmenter.last
-        held.append(_Tracked(frame, result, tracker.human, labels))
-        amended = tracker.amended
-        for n, better in enumerate(amended, len(held) - len(amended)):
-            held[n] = held[n]._replace(result=better)
-        if not tracker.in_doubt:
-            yield from held
-            held = []
+    try:
+        for frame in sequence:
+            result, segmenter = tracker.step(frame), tracker.segmenter
+            labels = None if segmenter is None else segmenter.last
+            held.append(_Tracked(frame, result, tracker.human, labels))
+            amended = tracker.amended
+            for n, better in enumerate(amended, len(held) - len(amended)):
+                held[n] = held[n]._replace(result=better)
+            if not tracker.in_doubt:
+                yield from held
+                held = []
+    except (Exception, KeyboardInterrupt):
+        yield from held
+        raise
     yield from held
 
 

@@ -81,16 +81,20 @@ class Duel:
         self.results.append(self.rival.step(frame))
         other, c = self.rival.reading, self.config
         if not (tracks and self.rival.tracks):
-            return Verdict(True, self.rival.tracks and len(self.doubts_m2) >= c.least_frames)
+            return Verdict(True, self.rival.tracks and self._ahead())
         if reading is not None and other is not None:
             self.doubts_m2.append((self._doubt_m2(reading), self._doubt_m2(other)))
-        own, others = np.sum(self.doubts_m2, axis=0) if self.doubts_m2 else (1.0, 1.0)
         late = len(self.results) > c.most_frames
         if len(self.doubts_m2) < c.least_frames:
             return Verdict(late)
-        if others < (c.wins_late if late else c.wins) * own:
+        if self._ahead(c.wins_late if late else c.wins):
             return Verdict(True, True)
-        return Verdict(late or others > c.loses * own)
+        return Verdict(late or not self._ahead(c.loses))
+
+    def _ahead(self, factor: float = 1.0) -> bool:
+        """Whether the rival's doubt is smaller than so many times the track's."""
+        own, others = np.sum(self.doubts_m2, axis=0) if self.doubts_m2 else (0.0, 0.0)
+        return bool(others < factor * own)
 
     def _doubt_m2(self, reading: Reading) -> float:
         """Mean square of how far surface and skin are apart, what is unexplained counted as far."""
