@@ -22,7 +22,7 @@ from kintrack.lifecycle import Life, LifecycleConfig, Reading
 from kintrack.person import LabelledConfig, geometric_lifecycle
 from kintrack.reporting import empty_result
 from kintrack.result import FrameResult
-from kintrack.rivals import Duel
+from kintrack.rivals import Duel, Vigil
 from kintrack.segmenter import Segmenter, Watched
 from kintrack.sequence.frame import Frame
 from kintrack.whereabouts import Whereabouts
@@ -61,6 +61,7 @@ class Memory:
         """What the last frames should have been, if the last step found its track turned round;
         that step's own result is the last of them."""
         self._duel: Duel | None = None
+        self._vigil = Vigil(self.config.rival)
         self._life, self._where = Life(), Whereabouts()
         self._failed_s = -np.inf
         self.surface: Surface | None = None

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A new track and its rival, who stands in the same place and faces the other way.
+"""A track and its rival, who stands in the same place and faces the other way.
 
 Front and back of a person look alike for one frame: a start that takes one for the other puts every
-left joint where the right one is. Whoever is followed with the wrong side forward is followed worse
-from frame to frame, since trunk, knees, elbows and feet bend and bulge the other way. So both are
-followed for some frames, by the same labels, and the one whose skin fits better stays.
+left joint where the right one is, and so does a track that loses somebody who turns. Whoever is
+followed with the wrong side forward is followed worse from frame to frame, since trunk, knees,
+elbows and feet bend and bulge the other way. So both are followed for some frames, by the same
+labels, and the one whose skin fits better stays: when a track begins, and when it becomes doubtful.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -40,7 +42,7 @@ class Verdict(NamedTuple):
 
 @dataclass
 class Duel:
-    """Both tracks of one person since the frame in which the first began."""
+    """Both tracks of one person since the frame in which the rival began."""
 
     rival: Tracker
     config: RivalConfig
@@ -53,10 +55,10 @@ class Duel:
     def between(
         cls, result: FrameResult, rival: Tracker, frame: Frame, config: RivalConfig
     ) -> Duel | None:
-        """Let a rival begin where a track has begun.
+        """Let a rival begin where a track is.
 
         Args:
-            result: First of the track.
+            result: The track's, of the frame.
             rival: A tracker that has seen nothing.
             frame: The frame.
             config: How long, and who wins.
@@ -83,7 +85,7 @@ class Duel:
         if not (tracks and self.rival.tracks):
             return Verdict(True, self.rival.tracks and self._ahead())
         if reading is not None and other is not None:
-            self.doubts_m2.append((self._doubt_m2(reading), self._doubt_m2(other)))
+            self.doubts_m2.append((doubt_m2(reading, c), doubt_m2(other, c)))
         late = len(self.results) > c.most_frames
         if len(self.doubts_m2) < c.least_frames:
             return Verdict(late)
@@ -96,9 +98,47 @@ class Duel:
         own, others = np.sum(self.doubts_m2, axis=0) if self.doubts_m2 else (0.0, 0.0)
         return bool(others < factor * own)
 
-    def _doubt_m2(self, reading: Reading) -> float:
-        """Mean square of how far surface and skin are apart, what is unexplained counted as far."""
-        return reading.rms_m**2 + (1.0 - reading.explained) * self.config.unexplained_m**2
+
+class Vigil:
+    """Watches one track, and says when it should be doubted."""
+
+    def __init__(self, config: RivalConfig, trusted: bool = False):
+        """Begin with a new track, which is to be doubted at once unless it is trusted."""
+        self._config = config
+        self._latest: deque[float] = deque(maxlen=config.smoothing_frames)
+        self._past: deque[tuple[float, float]] = deque()
+        self._last_s = -np.inf
+        self._owed = not trusted
+
+    def due(self, reading: Reading | None, timestamp_s: float) -> bool:
+        """Whether a duel should begin: at first, while doubt has risen, and once it has calmed.
+
+        Args:
+            reading: What the frame said of the track; None in its first frame.
+            timestamp_s: When [s].
+        """
+        if reading is not None:
+            self._latest.append(doubt_m2(reading, self._config))
+            self._past.append((timestamp_s, float(np.mean(self._latest))))
+            while timestamp_s - self._past[0][0] > self._config.memory_s:
+                self._past.popleft()
+        least = min((doubt for _, doubt in self._past), default=np.inf)
+        calm = not self._past or self._past[-1][1] <= self._config.alarm * least
+        self._owed |= not calm
+        if not self._owed or timestamp_s - self._last_s < self._config.again_s:
+            return False
+        self._last_s, self._owed = timestamp_s, not calm
+        return True
+
+
+def doubt_m2(reading: Reading, config: RivalConfig) -> float:
+    """Mean square of how far surface and skin are apart, what is unexplained counted as far [m^2].
+
+    Args:
+        reading: What a frame says of a track.
+        config: How far.
+    """
+    return reading.rms_m**2 + (1.0 - reading.explained) * config.unexplained_m**2
 
 
 def turned_round(joints: Float[ndarray, "j 3"]) -> Float[ndarray, "j 3"]:

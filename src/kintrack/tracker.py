@@ -27,7 +27,7 @@ from kintrack.person import own_pixels, part_pull
 from kintrack.reporting import coasted_result, fitted_result, reading_of
 from kintrack.residuals.prior import TangentPrior, diagonal_prior
 from kintrack.result import FrameResult
-from kintrack.rivals import Duel
+from kintrack.rivals import Duel, Vigil
 from kintrack.segmenter import Told, checked_labels, region_of
 from kintrack.sequence.frame import Frame
 from kintrack.sides import settle_sides
@@ -45,14 +45,16 @@ class Tracker(Memory):
             frame: The next frame in time; one with a problem is skipped.
 
         Returns:
-            Pose, joints, covariances and status. Who begins to be tracked is followed facing the
-            other way, too, for some frames; if that fits better, it is what is returned, and
-            `amended` has the frames before.
+            Pose, joints, covariances and status. Whoever begins to be tracked, or is doubtful, is
+            followed facing the other way, too, for some frames; if that fits better, it is what is
+            returned, and `amended` has the frames before.
         """
         with self._threads.limit(limits=1, user_api="blas"):
-            new, self.amended = self.belief is None, ()
+            if not self.tracks:
+                self._vigil = Vigil(self.config.rival)
+            self.amended = ()
             result = self._step(frame)
-            return self._settled(frame, result, new) if self.config.rival.most_frames else result
+            return self._settled(frame, result) if self.config.rival.most_frames else result
 
     def begin(self, frame: Frame, joints_camera: Float[ndarray, "j 3"]) -> FrameResult:
         """Start from joints that somebody else has found roughly, whatever the fit says of them.
@@ -77,11 +79,11 @@ class Tracker(Memory):
                 found = begin(human, seen, joints_camera, T, self.config)
             except AssociationError:
                 return self._nothing(frame, "initialising", began)
-            self._life = Life("tracking", None)
+            self._life, self._vigil = Life("tracking", None), Vigil(self.config.rival, trusted=True)
             person, sized_start = in_own_size(human, found, T, self.config)
             return self._meet_at(frame, person, sized_start or found, began)
 
-    def _settled(self, frame: Frame, result: FrameResult, new: bool) -> FrameResult:
+    def _settled(self, frame: Frame, result: FrameResult) -> FrameResult:
         """The frame's result, or the rival's if he stays."""
         began, human, T = time.perf_counter(), self._met, self.T_world_camera
         if self._duel is not None:
@@ -91,7 +93,7 @@ class Tracker(Memory):
                 self.amended = tuple(self._duel.results)
                 result = self.amended[-1]
             self._duel = None if verdict.over else self._duel
-        elif new and self.tracks:
+        elif self.tracks and self._vigil.due(self.reading, frame.timestamp_s):
             told = None if self.segmenter is None else Told(self.segmenter)
             rival = Tracker(self.config, human, T, segmenter=told, labelled=self.labelled)
             rival._where = self._where

@@ -40,10 +40,10 @@ def test_where_nothing_is_labelled_nothing_is_spread():
 
 def test_only_in_an_image_of_a_person_alone_is_everything_the_person(scene):
     depth = scene.depth(scene.place())
-    labels = np.zeros(depth.shape, dtype=np.uint8)
-    labels[np.unravel_index(np.argmax(depth > 0), depth.shape)] = 2
+    labels = np.where(depth > 0, 2, 0).astype(np.uint8)
+    labels[np.flatnonzero(labels.any(axis=1))[:40]] = 0
     bare = observe(scene.frame(depth), 320, labels=labels)
     assert bare.labels[bare.points_camera[..., 2] > 0].all()
     walled = observe(scene.frame(np.where(depth > 0, depth, 4.0).astype(np.float32)), 320,
                      labels=labels)  # fmt: skip
-    assert (walled.labels > 0).sum() <= 4
+    assert 0 < (walled.labels > 0).sum() < 0.9 * (bare.labels > 0).sum()

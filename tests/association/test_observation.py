@@ -63,3 +63,15 @@ def test_with_labels_the_region_is_the_labelled_pixels_that_have_a_reading(frame
     assert np.array_equal(seen.region, observe(frame, 640).region & (labels == 2))
     assert np.array_equal(seen.labels == 2, seen.region)
     assert seen.has_background == observe(frame, 640).has_background
+
+
+@pytest.mark.parametrize("height", [90, 300])
+def test_without_background_only_what_is_mostly_labelled_takes_labels(height):
+    """A person who is cut out lends her labels to her unlabelled pixels; a floor gets none."""
+    depth = np.zeros((481, 640), dtype=np.float32)
+    depth[100 : 100 + height, 200:300] = 2.0
+    labels = np.zeros((481, 640), dtype=np.uint8)
+    labels[100:180, 200:300] = 2
+    seen = observe(Frame(0, 0.0, CAMERA, depth), 640, labels=labels)
+    assert not seen.has_background
+    assert seen.region.sum() == 100 * (height if height == 90 else 80)
