@@ -10,6 +10,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src"
 ROWS = (
     ("errors",),
+    ("files",),
     ("joints",),
     ("geometry", "raster", "components"),
     ("bounds", "config", "deformation_config", "labelled_config", "rival_config"),
@@ -31,7 +32,7 @@ ROWS = (
     ("start",),
     ("begin",),
     ("offsets",),
-    ("result",),
+    ("result", "result_writer"),
     ("calibration",),
     ("person",),
     ("reporting",),

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from kintrack.errors import ResultError
+from kintrack.files import write_json
 from kintrack.geometry import PinholeCamera
-from kintrack.result import FrameResult, Track, TrackWriter, summarise, write_json
+from kintrack.result import FrameResult, Track
+from kintrack.result_writer import TrackWriter, summarise
 
 NAMES = ("pelvis", "head")
 CAMERA = PinholeCamera(320, 240, 285.0, 285.0, 159.5, 119.5)

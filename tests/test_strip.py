@@ -9,7 +9,7 @@ from kintrack.config import StartConfig, TrackerConfig
 from kintrack.errors import ResultError
 from kintrack.fit import fit_sequence
 from kintrack.joints import JOINT_NAMES
-from kintrack.result import TrackWriter
+from kintrack.result_writer import TrackWriter
 from kintrack.sequence import open_sequence
 from kintrack.strip import write_strip
 

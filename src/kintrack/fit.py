@@ -22,11 +22,13 @@ from kintrack.config import TrackerConfig
 from kintrack.errors import ResultError
 from kintrack.export import HtmlRecorder, VideoWriter, draw_overlay
 from kintrack.export.overlay import depth_range
+from kintrack.files import make_result_folder
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
 from kintrack.human import Human, load_human
 from kintrack.joints import JOINT_NAMES
 from kintrack.labelled_config import LabelledConfig
-from kintrack.result import FrameResult, Track, TrackWriter, make_result_folder
+from kintrack.result import FrameResult, Track
+from kintrack.result_writer import TrackWriter
 from kintrack.segmenter import Segmenter
 from kintrack.sequence.frame import Frame, SequenceReader
 from kintrack.skin import skinned_vertices

@@ -1,34 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tracking yields: a frame's result, a recording's track, and the folder that holds them."""
+"""What tracking yields: a frame's result and a recording's track."""
 
 from __future__ import annotations
 
-import importlib
-import json
-import math
-import os
-import platform
-import time
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from types import TracebackType
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from kintrack import __version__
 from kintrack.errors import ResultError
-from kintrack.geometry import PinholeCamera
-from kintrack.offsets import SURFACE_FILE, packed, save_offsets
+from kintrack.files import write_atomically
 
 STATUSES = ("initialising", "tracking", "lost", "skipped")
 TRACK_FILE = "track.npz"
-SUMMARY_FILE = "summary.json"
 
 
 @dataclass(frozen=True)
@@ -203,196 +193,3 @@ def _read_npz(path: Path) -> dict[str, ndarray]:
         raise ResultError(f"{path}: there is no such file") from None
     except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
         raise ResultError(f"{path} is not a track.npz: {error}") from error
-
-
-def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
-    """Write a file beside `path`, then move it there in one step.
-
-    Args:
-        path: The file to make or replace; its folder must exist.
-        write: Called with the open binary file.
-
-    Raises:
-        ResultError: if the folder or the file cannot be written.
-    """
-    path = Path(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        try:
-            with open(part, "wb") as file:
-                write(file)
-            os.replace(part, path)
-        except BaseException:
-            part.unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise ResultError(f"cannot write {path}: {error.strerror or error}") from error
-
-
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write sorted, indented, strictly valid JSON in one step; NaN and infinity become null.
-
-    Raises:
-        ResultError: if the file cannot be written.
-    """
-    text = json.dumps(_json_ready(content), indent=2, sort_keys=True, allow_nan=False) + "\n"
-    write_atomically(path, lambda file: file.write(text.encode()))
-
-
-def _json_ready(value: Any) -> Any:
-    """The value in JSON's own types."""
-    if isinstance(value, Mapping):
-        return {str(key): _json_ready(item) for key, item in value.items()}
-    if isinstance(value, (ndarray, np.generic)):
-        return _json_ready(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return [_json_ready(item) for item in value]
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-def make_result_folder(folder: Path) -> Path:
-    """Make the folder, and its parents, where they are missing.
-
-    Raises:
-        ResultError: if it cannot be made.
-    """
-    folder = Path(folder)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ResultError(f"cannot make the folder {folder}: {error.strerror}") from error
-    return folder
-
-
-class TrackWriter:
-    """Collects frames into a result folder that is valid at every moment.
-
-    Opening it writes an empty track, so a folder that cannot be written shows before any work, and
-    never mixes two runs. Leaving the `with` block writes every frame so far, whatever ended it; a
-    process killed outright loses the frames of the last `flush_every_s` at most.
-    """
-
-    def __init__(
-        self,
-        folder: Path,
-        joint_names: Sequence[str],
-        *,
-        sequence_name: str,
-        camera: PinholeCamera,
-        config: Mapping[str, Any],
-        flush_every_s: float = 5.0,
-    ) -> None:
-        """Make the folder and write an empty result.
-
-        Args:
-            folder: Result folder; made where missing.
-            joint_names: Names of the J reported joints.
-            sequence_name: Name of the recording.
-            camera: Camera of the depth images.
-            config: The whole resolved configuration, of JSON's types, tuples, paths and arrays.
-            flush_every_s: Longest time between two writes while frames arrive [s].
-
-        Raises:
-            ResultError: if the folder cannot be made or written.
-        """
-        self.folder = make_result_folder(folder)
-        self._joint_names = tuple(joint_names)
-        self._facts = {
-            "sequence": sequence_name,
-            "camera": asdict(camera),
-            "config": dict(config),
-            "versions": _versions(),
-        }
-        self._flush_every_s = flush_every_s
-        self._frames: list[FrameResult] = []
-        self._offsets: list[ndarray] = []
-        self._write(finished=False)
-        (self.folder / SURFACE_FILE).unlink(missing_ok=True)
-
-    def append(self, frame: FrameResult) -> None:
-        """Take one frame; now and then, write all so far.
-
-        Raises:
-            ResultError: if a write is due and fails.
-        """
-        self._offsets.append(packed(frame.offsets_m))
-        self._frames.append(replace(frame, offsets_m=None))
-        if time.monotonic() - self._written_at_s >= self._flush_every_s:
-            self._write(finished=False)
-
-    def note(self, **facts: Any) -> None:
-        """Add facts of the run to the summary, such as the person's shape, from now on."""
-        self._facts.update(facts)
-
-    def close(self, *, finished: bool = True) -> Track:
-        """Write every frame so far; `finished` says in the summary whether the recording ended.
-
-        Raises:
-            ResultError: if the folder cannot be written.
-        """
-        if any(map(len, self._offsets)):
-            write_atomically(
-                self.folder / SURFACE_FILE, lambda file: save_offsets(file, self._offsets)
-            )
-        return self._write(finished)
-
-    def __enter__(self) -> TrackWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close(finished=kind is None)
-
-    def _write(self, finished: bool) -> Track:
-        track = Track.from_frames(self._joint_names, self._frames)
-        reasons = [
-            {"frame": index, "reason": frame.reason}
-            for index, frame in enumerate(self._frames)
-            if frame.status == "skipped"
-        ]
-        track.save(self.folder / TRACK_FILE)
-        summary = self._facts | summarise(track) | {"skipped": reasons, "finished": finished}
-        write_json(self.folder / SUMMARY_FILE, summary)
-        self._written_at_s = time.monotonic()
-        return track
-
-
-def summarise(track: Track) -> dict[str, Any]:
-    """Counts, speed and residuals of a track.
-
-    Returns:
-        frames and status_counts; latency_ms, the median and 95th percentile of the milliseconds of
-        frames not skipped; fps_median = 1000 / median latency; residual_rms_m, the median and 95th
-        percentile over frames with status `tracking`. NaN where there is no such frame.
-    """
-    latency_ms = _median_p95(track.milliseconds[track.status != "skipped"])
-    return {
-        "frames": len(track),
-        "status_counts": {name: int(np.sum(track.status == name)) for name in STATUSES},
-        "latency_ms": latency_ms,
-        "fps_median": 1000.0 / latency_ms["median"] if latency_ms["median"] > 0 else math.nan,
-        "residual_rms_m": _median_p95(track.residual_rms_m[track.status == "tracking"]),
-    }
-
-
-def _median_p95(values: Float[ndarray, " n"]) -> dict[str, float]:
-    values = values[np.isfinite(values)]
-    if values.size == 0:
-        return {"median": math.nan, "p95": math.nan}
-    return {"median": float(np.median(values)), "p95": float(np.percentile(values, 95))}
-
-
-def _versions() -> dict[str, str]:
-    modules = {"numpy": "numpy", "pin": "pinocchio", "numba": "numba", "opencv": "cv2"}
-    versions = {
-        name: importlib.import_module(module).__version__ for name, module in modules.items()
-    }
-    return versions | {"python": platform.python_version(), "kintrack": __version__}

@@ -17,11 +17,12 @@ from kintrack.deformation.relief import Relief, relief_of
 from kintrack.errors import ResultError
 from kintrack.export.coloring import COLORINGS, colors_of, residuals_of
 from kintrack.export.mesh import write_glb, write_ply
+from kintrack.files import make_result_folder
 from kintrack.fit import load_person
 from kintrack.geometry import invert_rigid, transform_points
 from kintrack.human import Human, load_human
 from kintrack.offsets import SURFACE_FILE, load_offsets
-from kintrack.result import TRACK_FILE, Track, make_result_folder
+from kintrack.result import TRACK_FILE, Track
 from kintrack.sequence.frame import SequenceReader
 from kintrack.skin import Skin, load_skin, skinned_vertices, vertex_normals
 

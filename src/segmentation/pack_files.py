@@ -18,7 +18,7 @@ import numpy as np
 from numpy import ndarray
 
 from kintrack.errors import DatasetError
-from kintrack.result import write_json
+from kintrack.files import write_json
 from segmentation.picture import HEIGHT, WIDTH, Picture
 
 DEPTH_UNIT_M = 0.00025

@@ -23,7 +23,7 @@ from numpy import ndarray
 from torch.utils.data import DataLoader
 
 from kintrack import __version__
-from kintrack.result import write_json
+from kintrack.files import write_json
 from segmentation.augment.sample import AugmentConfig, Bank
 from segmentation.calibrate import calibrated
 from segmentation.curves import CURVES_FILE, LOG_FILE, append_log, draw_curves, read_log

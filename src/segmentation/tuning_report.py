@@ -14,7 +14,7 @@ from numpy import ndarray
 
 from kintrack.export import PART_COLORS, contact_sheet
 from kintrack.export.overlay import depth_picture, depth_range
-from kintrack.result import write_atomically, write_json
+from kintrack.files import write_atomically, write_json
 from segmentation.before_after import Shown
 from segmentation.labels import LABELS, person_of
 from segmentation.preprocess import DEPTH_SCALE, HOLE, REFERENCE_DEPTH_M

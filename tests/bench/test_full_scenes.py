@@ -5,7 +5,8 @@ import pytest
 from kintrack.bench.cases import Case
 from kintrack.bench.full_scenes import witnessed
 from kintrack.joints import JOINT_NAMES
-from kintrack.result import FrameResult, TrackWriter
+from kintrack.result import FrameResult
+from kintrack.result_writer import TrackWriter
 
 from .small_bench import CAMERA, record
 from .small_bench import witnessed as write_witness

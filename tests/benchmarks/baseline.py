@@ -13,7 +13,7 @@ from typing import Any
 from report import cpu_model, table
 
 from kintrack.errors import ResultError
-from kintrack.result import write_json
+from kintrack.files import write_json
 
 BASELINE = Path(__file__).parent / "baseline.json"
 """The committed values."""

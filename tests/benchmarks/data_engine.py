@@ -13,7 +13,7 @@ from command import OUT, parser, run
 
 from kintrack.bench.filming import FilmingConfig, run_filming
 from kintrack.commands.console import StepProgress, console
-from kintrack.result import make_result_folder, write_json
+from kintrack.files import make_result_folder, write_json
 from synthesis.dataset.build import build_dataset
 from synthesis.dataset.pictures import write_sheet
 from synthesis.dataset.recipes import takes_of

@@ -21,7 +21,7 @@ from kintrack.commands.segmenting import Segmentation
 from kintrack.config import TrackerConfig
 from kintrack.fit import fit_sequence
 from kintrack.geometry import camera_pose
-from kintrack.result import SUMMARY_FILE
+from kintrack.result_writer import SUMMARY_FILE
 from kintrack.sequence import open_sequence
 from segmentation.weights import SHIPPED
 

@@ -25,8 +25,8 @@ from numpy import ndarray
 
 from kintrack.commands.train import Train
 from kintrack.errors import ResultError
+from kintrack.files import write_json
 from kintrack.geometry import LABELS
-from kintrack.result import write_json
 from kintrack.sequence import open_sequence
 from kintrack.sequence.frame import Frame
 from kintrack.sequence.reference import read_reference_joints

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scoring import ACTIONS, JOINT_KINDS, RecordingScore, pool
 
+from kintrack.files import write_atomically
 from kintrack.metrics import THRESHOLDS_M
-from kintrack.result import write_atomically
 
 _COLORS = ("#56b4e9", "#0072b2", "#e69f00", "#d55e00", "#009e73", "#cc79a7", "#999999")
 _BLUE, _ORANGE = "#0072b2", "#d55e00"

@@ -25,7 +25,7 @@ from scenes import SCENES, SceneScore, score_scene
 from scoring import JOINT_KINDS, RecordingScore, pool, score_recording
 
 from kintrack.errors import SequenceError
-from kintrack.result import make_result_folder, write_json
+from kintrack.files import make_result_folder, write_json
 
 QUICK = ("a01_s1_t1", "a13_s2_t1", "a22_s3_t1", "a24_s4_t1", "a27_s5_t1")
 """One recording of each person."""

@@ -18,7 +18,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 from kintrack.errors import ResultError
-from kintrack.result import write_atomically
+from kintrack.files import write_atomically
 
 ROOT = Path(__file__).resolve().parents[2]
 """Top of the repository."""

@@ -23,6 +23,7 @@ from numpy import ndarray
 
 import kintrack
 from kintrack.bench.cases import pitch_of
+from kintrack.files import write_json
 from kintrack.geometry import LABELS, camera_pose
 from kintrack.joints import JOINT_NAMES
 from kintrack.labelling.disputes import part_iou
@@ -30,7 +31,6 @@ from kintrack.labelling.foreground import find_foreground, only_person
 from kintrack.labelling.keeping import top_reasons
 from kintrack.labelling.opinions import LabelledFrame, Labeller, LabellingConfig
 from kintrack.labelling.passes import track_both_ways
-from kintrack.result import write_json
 from kintrack.sequence import open_sequence
 from kintrack.sequence.recording import Recording
 from kintrack.sequence.reference import read_reference_joints

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy import ndarray
 
-from kintrack.result import write_atomically
+from kintrack.files import write_atomically
 
 CURVES = {
     "step": "Kinect v1: step to the next level [mm]",

@@ -21,8 +21,8 @@ from sensor_figure import CURVES, Curve, write_figure
 from sensor_scenes import kitchen, looking, person, view_of, wall_view
 
 from kintrack.errors import SequenceError
+from kintrack.files import make_result_folder, write_json
 from kintrack.geometry import PinholeCamera
-from kintrack.result import make_result_folder, write_json
 from synthesis.render.view import View
 from synthesis.sensors.catalogue import SENSORS
 from synthesis.sensors.kinect_v1 import KinectV1

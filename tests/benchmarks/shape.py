@@ -34,9 +34,10 @@ from kintrack.calibration.errors import CalibrationError
 from kintrack.calibration.recording import calibrate_recording
 from kintrack.commands.segmenting import Segmentation
 from kintrack.config import StartConfig, TrackerConfig
+from kintrack.files import make_result_folder, write_json
 from kintrack.fit import load_person
 from kintrack.geometry import camera_pose
-from kintrack.result import TRACK_FILE, Track, make_result_folder, write_json
+from kintrack.result import TRACK_FILE, Track
 from kintrack.segmenter import Segmenter
 from kintrack.sequence import open_sequence
 from synthesis.dataset.recipes import (

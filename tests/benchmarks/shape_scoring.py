@@ -22,7 +22,8 @@ from kintrack.fit import fit_sequence
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.human import load_human
 from kintrack.joints import JOINT_NAMES
-from kintrack.result import SUMMARY_FILE, Track
+from kintrack.result import Track
+from kintrack.result_writer import SUMMARY_FILE
 from kintrack.segmenter import Segmenter
 from kintrack.sequence.frame import Frame, SequenceReader
 from kintrack.sequence.reference import read_reference_joints

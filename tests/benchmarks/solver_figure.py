@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy import ndarray
 
-from kintrack.result import write_atomically
+from kintrack.files import write_atomically
 
 _STYLES = {
     "no limits": {"color": "#999999", "ls": ":", "lw": 1.4},

@@ -29,7 +29,7 @@ from stages import StageClock, median_p95
 
 import kintrack
 from kintrack.config import SolverConfig, TrackerConfig
-from kintrack.result import make_result_folder, write_json
+from kintrack.files import make_result_folder, write_json
 from kintrack.sequence import SequenceReader, open_sequence
 from kintrack.tracker import Tracker
 

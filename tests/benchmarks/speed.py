@@ -26,7 +26,7 @@ from rich.progress import track
 from stages import STAGES, Doubled, Timing, median_p95, time_tracker
 
 import kintrack
-from kintrack.result import make_result_folder, write_json
+from kintrack.files import make_result_folder, write_json
 from kintrack.sequence import SequenceReader, open_sequence
 from kintrack.tracker import Tracker
 

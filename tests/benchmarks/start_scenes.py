@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from kintrack.errors import KintrackError
+from kintrack.files import write_json
 from kintrack.joints import JOINT_NAMES
-from kintrack.result import write_json
 from kintrack.sequence.write import SequenceWriter
 from synthesis.dataset.record import TAKE_FILE
 from synthesis.film import film

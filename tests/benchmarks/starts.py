@@ -23,13 +23,13 @@ from threadpoolctl import threadpool_limits
 from kintrack.alignment import view_skin
 from kintrack.association.observation import observe
 from kintrack.config import TrackerConfig
+from kintrack.files import write_json
 from kintrack.geometry import invert_rigid, transform_points
 from kintrack.human import Human, load_human
 from kintrack.joints import JOINT_NAMES
 from kintrack.judge import label_agreement, label_counts
 from kintrack.labelled_config import LifecycleConfig
 from kintrack.lifecycle import Life, Reading, absent, judged
-from kintrack.result import write_json
 from kintrack.segmenter import Segmenter
 from kintrack.sequence import open_sequence
 from kintrack.sequence.occlusion import OCCLUSION_FILE, read_occlusion

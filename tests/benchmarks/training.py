@@ -25,7 +25,7 @@ from command import DATA, OUT, run
 from matplotlib.figure import Figure
 
 from kintrack.errors import DatasetError, ResultError
-from kintrack.result import write_atomically
+from kintrack.files import write_atomically
 from segmentation.curves import LOG_FILE, read_log
 from segmentation.train import WEIGHTS_FILE
 from segmentation.weights import load_weights

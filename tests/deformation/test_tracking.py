@@ -10,7 +10,7 @@ from kintrack.errors import ResultError
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.joints import JOINT_NAMES
 from kintrack.offsets import SURFACE_FILE, load_offsets
-from kintrack.result import TrackWriter
+from kintrack.result_writer import TrackWriter
 from kintrack.surfaces import load_surfaces, write_surfaces
 from kintrack.tracker import Tracker
 

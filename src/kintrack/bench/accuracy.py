@@ -21,7 +21,8 @@ from kintrack.bench.running import Fitting, run_all
 from kintrack.bench.scores import Errors, errors_of
 from kintrack.bench.summary import content_of
 from kintrack.errors import ResultError, SequenceError
-from kintrack.result import TRACK_FILE, make_result_folder, write_json
+from kintrack.files import make_result_folder, write_json
+from kintrack.result import TRACK_FILE
 from kintrack.sequence import open_sequence
 from kintrack.sequence.reference import REFERENCE_FILE
 from segmentation.weights import load_weights

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 
 from kintrack.bench.cases import ALONE, CLEAN, OBJECTS, REAL, ROOM, SCENE
 from kintrack.bench.methods import CALIBRATED, COLD, GEOMETRY, NO_TARGETS, RGB, TRUE_LABELS
+from kintrack.files import write_atomically
 from kintrack.joints import JOINT_NAMES
-from kintrack.result import write_atomically
 
 CURVES_FILE, JOINTS_FILE = "accuracy.png", "joints.png"
 SHOWN = (CLEAN, SCENE, *reversed(OBJECTS))

@@ -20,9 +20,10 @@ from kintrack.bench.methods import GEOMETRY, RGB, Method
 from kintrack.bench.rgb import VISIBLE, lift
 from kintrack.export import draw_overlay
 from kintrack.export.overlay import BAR_PX, depth_picture, depth_range
+from kintrack.files import write_atomically
 from kintrack.fit import load_person, posed_skin
 from kintrack.joints import JOINT_NAMES
-from kintrack.result import TRACK_FILE, Track, write_atomically
+from kintrack.result import TRACK_FILE, Track
 from kintrack.sequence import open_sequence
 from kintrack.sequence.frame import Frame
 from kintrack.sequence.reference import read_reference_pixels

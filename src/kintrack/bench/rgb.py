@@ -21,7 +21,8 @@ from numpy import ndarray
 from kintrack.bench import rgb_worker
 from kintrack.errors import ResultError
 from kintrack.joints import JOINT_NAMES
-from kintrack.result import FrameResult, Track, TrackWriter
+from kintrack.result import FrameResult, Track
+from kintrack.result_writer import TrackWriter
 from kintrack.sequence.frame import Frame, SequenceReader
 from kintrack.sequence.reference import read_reference_pixels
 

@@ -17,8 +17,8 @@ from numpy import ndarray
 from kintrack.calibration.clothing import REGIONS, THICKEST_M, dressed_space
 from kintrack.calibration.errors import CalibrationError
 from kintrack.calibration.measures import LIMBS, Length
+from kintrack.files import write_json
 from kintrack.human import Human
-from kintrack.result import write_json
 from kintrack.shape import load_shape_space
 
 FORMAT = "kintrack person 1"

@@ -51,10 +51,11 @@ class Calibrate:
         from kintrack.calibration.calibrator import check_stated
         from kintrack.calibration.person import write_person
         from kintrack.calibration.recording import calibrate_recording
+        from kintrack.files import make_result_folder
         from kintrack.fit import fit_sequence, load_person
         from kintrack.geometry import camera_pose
         from kintrack.modelling.personal import write_personal_model
-        from kintrack.result import TRACK_FILE, Track, make_result_folder
+        from kintrack.result import TRACK_FILE, Track
 
         check_stated(self.height_m)
         sequence, segmenter = self.recording.open(self.sequence), self.segmentation.segmenter()

@@ -95,7 +95,8 @@ class Fit:
 
 
 def _print_summary(folder: Path, *others: Path | None) -> None:
-    from kintrack.result import SUMMARY_FILE, TRACK_FILE, Track
+    from kintrack.result import TRACK_FILE, Track
+    from kintrack.result_writer import SUMMARY_FILE
 
     track = Track.load(folder / TRACK_FILE)
     counts = Counter(str(status) for status in track.status)

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from kintrack.evaluation.comparison import Evaluation
 from kintrack.evaluation.figure import plot_evaluation
-from kintrack.result import make_result_folder, write_atomically, write_json
+from kintrack.files import make_result_folder, write_atomically, write_json
 
 
 def write_evaluation(evaluation: Evaluation, folder: Path) -> None:

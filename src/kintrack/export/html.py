@@ -12,8 +12,8 @@ from numpy import ndarray
 
 from kintrack.errors import ResultError
 from kintrack.export.packing import assemble_page, pack_frame, pack_scene, script_json
+from kintrack.files import write_atomically
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, PinholeCamera
-from kintrack.result import write_atomically
 from kintrack.sequence import Frame
 from kintrack.skin import Skin
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
-from kintrack.result import write_atomically
+from kintrack.files import write_atomically
 
 _FLOAT, _UINT, _BYTE = 5126, 5125, 5121
 _VERTICES, _INDICES = 34962, 34963

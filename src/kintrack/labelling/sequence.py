@@ -16,13 +16,13 @@ from numpy import ndarray
 from kintrack import __version__
 from kintrack.config import TrackerConfig
 from kintrack.errors import ResultError
+from kintrack.files import make_result_folder, write_atomically, write_json
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.labelling.foreground import find_foreground, only_person
 from kintrack.labelling.keeping import Reason, top_reasons
 from kintrack.labelling.opinions import LabelledFrame, Labeller, LabellingConfig
 from kintrack.labelling.passes import track_both_ways
 from kintrack.labelling.picture import LabelStrip
-from kintrack.result import make_result_folder, write_atomically, write_json
 from kintrack.sequence import SequenceReader
 from kintrack.sequence.recording import Recording
 from kintrack.sequence.write import SequenceWriter

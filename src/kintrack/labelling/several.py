@@ -22,10 +22,10 @@ from numpy import ndarray
 from kintrack import __version__
 from kintrack.config import TrackerConfig
 from kintrack.errors import ConfigError, DatasetError, KintrackError
+from kintrack.files import write_json
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.labelling.opinions import LabellingConfig
 from kintrack.labelling.sequence import label_sequence
-from kintrack.result import write_json
 from kintrack.sequence import SequenceReader, open_sequence
 from kintrack.sequence.recording import Recording
 

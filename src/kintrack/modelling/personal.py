@@ -16,11 +16,11 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+from kintrack.files import make_result_folder, write_atomically
 from kintrack.modelling.limits import CONTACTS, contact_ratios, flexion_limits
 from kintrack.modelling.segments import BODY_MASS_INDEX, SegmentBody, segment_bodies
 from kintrack.modelling.skeleton import JOINT_OF_SEGMENT, SEGMENTS
 from kintrack.modelling.urdf import human_urdf
-from kintrack.result import make_result_folder, write_atomically
 from kintrack.rig import load_rig, read_arrays
 from kintrack.shape import ShapeSpace, checked_shape, load_shape_space
 

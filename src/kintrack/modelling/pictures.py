@@ -13,10 +13,10 @@ from numpy import ndarray
 from kintrack.body import load_body, run_kinematics
 from kintrack.export import contact_sheet
 from kintrack.export.overlay import PART_COLORS
+from kintrack.files import make_result_folder
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, PinholeCamera
 from kintrack.human import posed
 from kintrack.raster import rasterise
-from kintrack.result import make_result_folder
 from kintrack.rig import load_rig, model_folder
 from kintrack.skin import load_skin, skinned_vertices, vertex_normals
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import kintrack
 from kintrack.errors import DatasetError
-from kintrack.result import write_json
+from kintrack.files import write_json
 from synthesis.dataset.record import folder_of, is_recorded, partial_of, record
 from synthesis.sensors.catalogue import SENSORS
 from synthesis.takes import Take

@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from kintrack.errors import DatasetError
 from kintrack.export.overlay import PART_COLORS
-from kintrack.result import make_result_folder
+from kintrack.files import make_result_folder
 from kintrack.sequence import open_sequence
 from kintrack.sequence.frame import Frame
 from synthesis.dataset.build import sequences

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from kintrack.errors import DatasetError, ResultError, SceneError
+from kintrack.files import write_json
 from kintrack.joints import JOINT_NAMES
-from kintrack.result import write_json
 from kintrack.sequence.write import SequenceWriter
 from synthesis.film import film
 from synthesis.scene import Scene, build_scene

@@ -13,9 +13,9 @@ from numpy import ndarray
 
 from kintrack.bounds import check_bounds
 from kintrack.errors import SceneError
+from kintrack.files import write_json
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.joints import JOINT_NAMES
-from kintrack.result import write_json
 from kintrack.sequence.frame import Frame, SequenceReader
 from kintrack.sequence.occlusion import OCCLUSION_FILE, read_occlusion
 from kintrack.sequence.reference import REFERENCE_FILE, read_reference_joints

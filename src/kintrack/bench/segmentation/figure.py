@@ -20,7 +20,7 @@ from kintrack.bench.segmentation.networks import Network
 from kintrack.bench.segmentation.samples import DEPTH, MODALITIES, RGBD, Sample, samples
 from kintrack.bench.segmentation.summary import OBJECTS, Judged
 from kintrack.bench.segmentation.witness import OWN
-from kintrack.result import write_atomically
+from kintrack.files import write_atomically
 from segmentation.labels import IGNORED, LABELS
 from segmentation.preprocess import COLOR_MIDDLE, COLOR_SCALE, FARTHEST, HOLE, NEAREST, letterbox
 

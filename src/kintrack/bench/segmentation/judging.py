@@ -18,7 +18,7 @@ from kintrack.bench.segmentation.networks import Network
 from kintrack.bench.segmentation.samples import DEPTH, DEPTH_ONCE, MODALITIES, Sample, samples
 from kintrack.bench.segmentation.witness import JointCounts
 from kintrack.errors import DatasetError
-from kintrack.result import write_json
+from kintrack.files import write_json
 from segmentation.evaluate import N, confusion, scores_of
 from segmentation.labels import BACKGROUND, IGNORED
 

@@ -24,7 +24,7 @@ from kintrack.bench.segmentation.networks import Network, judging_digest, load_n
 from kintrack.bench.segmentation.runtimes import agreement, count, timing, variants
 from kintrack.bench.segmentation.samples import Sample, samples
 from kintrack.bench.segmentation.summary import Judged, summary, targets
-from kintrack.result import make_result_folder, write_json
+from kintrack.files import make_result_folder, write_json
 from kintrack.sequence.folder import open_folder
 from kintrack.sequence.frame import Frame
 
