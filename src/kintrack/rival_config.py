@@ -22,7 +22,7 @@ class RivalConfig:
     """The same once it is over."""
     loses: float = 1.3
     """It goes if its doubt is larger by this factor."""
-    unexplained_m: float = 0.05
+    unexplained_m: float = 0.025
     """How far off a point counts that the skin does not explain [m]."""
 
     alarm: float = 1.3
