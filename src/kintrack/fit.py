@@ -205,7 +205,7 @@ def _settled(sequence: SequenceReader, tracker: Tracker) -> Iterator[_Tracked]:
             held.append(_Tracked(frame, result, tracker.human, labels))
             amended = tracker.amended
             for n, better in enumerate(amended, len(held) - len(amended)):
-                held[n] = held[n]._replace(result=better)
+                held[n] = held[n]._replace(result=better, human=tracker.human)
             if not tracker.in_doubt:
                 yield from held
                 held = []

@@ -92,7 +92,8 @@ class Memory:
     def _become(self, other: Memory) -> None:
         """Go on from where another tracker is."""
         self.belief, self.reading, self.surface = other.belief, other.reading, other.surface
-        self.human, self._fitted = other.human, other._fitted
+        self._met, self.human, self._fitted = other._met, other.human, other._fitted
+        self._resting, self._prior_sigma = other._resting, other._prior_sigma
         self._life, self._where = other._life, other._where
 
     def _lifecycle(self, observation: Observation) -> LifecycleConfig:

@@ -27,7 +27,7 @@ from kintrack.person import own_pixels, part_pull
 from kintrack.reporting import coasted_result, fitted_result, reading_of
 from kintrack.residuals.prior import TangentPrior, diagonal_prior
 from kintrack.result import FrameResult
-from kintrack.rivals import Duel, Vigil
+from kintrack.rivals import Duel, Verdict, Vigil
 from kintrack.segmenter import Told, checked_labels, region_of
 from kintrack.sequence.frame import Frame
 from kintrack.sides import settle_sides
@@ -79,20 +79,17 @@ class Tracker(Memory):
                 found = begin(human, seen, joints_camera, T, self.config)
             except AssociationError:
                 return self._nothing(frame, "initialising", began)
-            self._life, self._vigil = Life("tracking", None), Vigil(self.config.rival, trusted=True)
+            self.belief, self._life, self._duel = None, Life("tracking", None), None
+            self._vigil = Vigil(self.config.rival, trusted=True)
             person, sized_start = in_own_size(human, found, T, self.config)
             return self._meet_at(frame, person, sized_start or found, began)
 
     def _settled(self, frame: Frame, result: FrameResult) -> FrameResult:
         """The frame's result, or the rival's if he stays."""
         began, human, T = time.perf_counter(), self._met, self.T_world_camera
+        verdict = Verdict(over=False)
         if self._duel is not None:
             verdict = self._duel.step(frame, self.tracks, self.reading)
-            if verdict.turned:
-                self._become(self._duel.rival)
-                self.amended = tuple(self._duel.results)
-                result = self.amended[-1]
-            self._duel = None if verdict.over else self._duel
         elif self.tracks and self._vigil.due(self.reading, frame.timestamp_s):
             told = None if self.segmenter is None else Told(self.segmenter)
             rival = Tracker(self.config, human, T, segmenter=told, labelled=self.labelled)
@@ -101,8 +98,14 @@ class Tracker(Memory):
         else:
             return result
         self._clock("rival")
-        spent_ms = 1e3 * (time.perf_counter() - began)
-        return replace(result, milliseconds=result.milliseconds + spent_ms)
+        both_ms = result.milliseconds + 1e3 * (time.perf_counter() - began)
+        if self._duel is not None:
+            self._duel.results[-1] = replace(self._duel.results[-1], milliseconds=both_ms)
+            if verdict.turned:
+                self._become(self._duel.rival)
+                self.amended = tuple(self._duel.results)
+            self._duel = None if verdict.over else self._duel
+        return self.amended[-1] if verdict.turned else replace(result, milliseconds=both_ms)
 
     def _step(self, frame: Frame) -> FrameResult:
         began, self.reading = time.perf_counter(), None

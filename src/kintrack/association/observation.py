@@ -63,7 +63,7 @@ def observe(
     if labels is None:
         return Observation(camera, points, read, has_background)
     part = labels_of_pixels(labels, points[..., 2])
-    if not has_background and (part > 0).sum() > LEAST_LABELLED * read.sum():
+    if not has_background and (part > 0).sum() >= LEAST_LABELLED * read.sum():
         part = spread_labels(part, points[..., 2])
     return Observation(camera, points, part > 0, has_background, part)
 
