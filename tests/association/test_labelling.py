@@ -23,15 +23,28 @@ def test_a_pixel_without_reading_is_background():
     assert found[1, 2] == 0 and (found == 3).sum() == 15
 
 
-def test_what_is_left_takes_the_label_of_what_is_nearest_and_holes_take_none():
-    depth = np.full((5, 9), 2.0)
+def test_what_is_left_of_a_piece_takes_the_label_of_what_is_nearest_and_holes_take_none():
+    depth = np.full((5, 11), 2.0)
     depth[0] = 0.0
-    part = np.zeros((5, 9), dtype=np.uint8)
-    part[2, 0], part[2, 8] = 3, 6
+    part = np.zeros((5, 11), dtype=np.uint8)
+    part[1:, :4], part[1:, 7:] = 3, 6
     found = spread_labels(part, depth)
     assert (found[0] == 0).all()
-    assert (found[1:, :4] == 3).all() and (found[1:, 5:] == 6).all()
-    assert set(found[1:, 4]) <= {3, 6}
+    assert (found[1:, :5] == 3).all() and (found[1:, 6:] == 6).all()
+    assert set(found[1:, 5]) <= {3, 6}
+
+
+def test_a_thing_before_a_person_and_a_floor_at_her_feet_take_no_label():
+    """Both touch her in the image; the one is nearer, of the other too little is labelled."""
+    depth = np.full((30, 20), 2.0)
+    depth[5:12] = 1.7
+    part = np.full((30, 20), 2, dtype=np.uint8)
+    part[5:12] = 0
+    part[20:, 3:] = 0
+    found = spread_labels(part, depth)
+    assert (found[5:12] == 0).all()
+    assert np.array_equal(found[12:], part[12:])
+    assert (found[:5] == 2).all()
 
 
 def test_where_nothing_is_labelled_nothing_is_spread():

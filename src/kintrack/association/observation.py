@@ -14,10 +14,6 @@ from kintrack.association.labelling import labels_of_pixels, spread_labels
 from kintrack.geometry import PinholeCamera
 from kintrack.sequence.frame import Frame
 
-LEAST_LABELLED = 0.5
-"""Where there is no background and labels call at least this share of the readings a person, she
-was cut out; where they call less, the rest is a floor or things beside her."""
-
 
 @dataclass(frozen=True)
 class Observation:
@@ -51,8 +47,8 @@ def observe(
 
     Returns:
         The observation; its region is every pixel with a reading, or, where there are labels,
-        every one that a label calls a part of the person. If there is nothing behind her and most
-        of what there is has her labels, what is left takes the label of what is nearest to it.
+        every one that a label calls a part of the person. If there is nothing behind her, what is
+        left of a piece that is hers takes the label of what is nearest to it.
     """
     assert frame.depth_m is not None
     factor = -(-frame.camera.width // max_width_px)
@@ -63,7 +59,7 @@ def observe(
     if labels is None:
         return Observation(camera, points, read, has_background)
     part = labels_of_pixels(labels, points[..., 2])
-    if not has_background and (part > 0).sum() >= LEAST_LABELLED * read.sum():
+    if not has_background:
         part = spread_labels(part, points[..., 2])
     return Observation(camera, points, part > 0, has_background, part)
 
