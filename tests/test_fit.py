@@ -84,7 +84,7 @@ def test_the_summary_tells_everything_about_the_run(fitted, sequence):
     assert sum(summary["status_counts"].values()) == FRAMES
     assert summary["camera"]["fx"] == sequence.camera.fx
     assert summary["config"]["solver"]["rounds"] >= 1
-    assert summary["skipped"] == []
+    assert summary["skipped"] == [] == summary["untracked"]
     assert np.allclose(summary["T_world_camera"], T_LEVEL_WORLD_CAMERA)
     assert summary["residual_rms_m"]["median"] < 0.015
 

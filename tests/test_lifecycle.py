@@ -6,6 +6,7 @@ import pytest
 
 from kintrack.errors import ConfigError
 from kintrack.lifecycle import (
+    GONE,
     HIDDEN,
     NOBODY,
     Life,
@@ -15,6 +16,7 @@ from kintrack.lifecycle import (
     absent,
     judged,
     objection,
+    unbegun,
 )
 
 CONFIG = LifecycleConfig()
@@ -64,6 +66,15 @@ def test_a_young_track_is_given_up_sooner():
 def test_nobody_in_view_ends_a_track_with_that_reason():
     life = run(Life(), *[GOOD] * 20, *[None] * CONFIG.patience)
     assert (life.status, life.reason) == ("lost", NOBODY)
+
+
+def test_while_no_first_pose_is_tried_the_reason_is_who_is_missing_or_the_last_objection():
+    rejected = run(Life(), BAD)
+    assert unbegun(rejected, CONFIG, in_view=True).reason == rejected.reason != NOBODY
+    assert unbegun(rejected, CONFIG, in_view=False).reason == NOBODY
+    lost = run(Life(), *[GOOD] * 20, *[BAD] * CONFIG.patience)
+    assert unbegun(lost, CONFIG, in_view=False).reason == GONE
+    assert unbegun(lost, CONFIG, in_view=True).status == "lost"
 
 
 def test_from_lost_a_good_frame_leads_back():

@@ -151,7 +151,8 @@ def test_the_writer_leaves_a_track_and_a_summary(tmp_path):
     with open_writer(folder, config={"ratio": float("nan"), "size": (1, 2)}) as writer:
         for index, status in enumerate(statuses):
             slow = 5.0 if status == "skipped" else 10.0 * (index + 1)
-            writer.append(make_frame(index, status, milliseconds=slow))
+            why = {"initialising": "nobody in view", "skipped": "no depth"}.get(status)
+            writer.append(make_frame(index, status, milliseconds=slow, reason=why))
     assert Track.load(folder / "track.npz").status.tolist() == statuses
     text = (folder / "summary.json").read_text()
     summary = json.loads(text, parse_constant=pytest.fail)
@@ -159,6 +160,7 @@ def test_the_writer_leaves_a_track_and_a_summary(tmp_path):
     assert summary["finished"] is True and summary["frames"] == 5
     assert summary["status_counts"] == {"initialising": 1, "tracking": 2, "lost": 1, "skipped": 1}
     assert summary["skipped"] == [{"frame": 3, "reason": "no depth"}]
+    assert summary["untracked"] == [{"frame": 0, "reason": "nobody in view"}]
     assert summary["config"] == {"ratio": None, "size": [1, 2]}
     assert summary["camera"]["fx"] == 285.0 and summary["sequence"] == "walk"
     assert set(summary["versions"]) == {"python", "kintrack", "numpy", "pin", "numba", "opencv"}

@@ -19,7 +19,8 @@ from kintrack.labelled_config import LifecycleConfig, Limits
 
 NOBODY = "nobody in view"
 HIDDEN = "hardly anything of the person is seen"
-SOMEBODY_ELSE = "somebody else is in view; the lost person may still be hidden"
+GONE = "the lost person is not in view"
+UNFITTED = "the body does not fit what is seen of the person"
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,18 @@ def absent(life: Life, config: LifecycleConfig, reason: str = NOBODY) -> Life:
     if life.tracks:
         return _worse(life, config, reason)
     return replace(life, reason=reason, wait=max(life.wait - 1, 0))
+
+
+def unbegun(life: Life, config: LifecycleConfig, in_view: bool) -> Life:
+    """The next state after a frame in which no first pose was tried.
+
+    Args:
+        life: The state before; of no track.
+        config: When a track ends.
+        in_view: Whether the person is in view; then the last objection still stands.
+    """
+    missing = GONE if life.status == "lost" else NOBODY
+    return absent(life, config, (life.reason or UNFITTED) if in_view else missing)
 
 
 def judged(life: Life, reading: Reading, config: LifecycleConfig) -> Life:

@@ -110,5 +110,5 @@ class Memory:
     def _nothing(
         self, frame: Frame, status: str, began: float, reason: str | None = None
     ) -> FrameResult:
-        """A result without a pose."""
-        return empty_result(frame, self._fitted.body, status, began, reason)
+        """A result without a pose; what keeps the person from being tracked unless told else."""
+        return empty_result(frame, self._fitted.body, status, began, reason or self._life.reason)

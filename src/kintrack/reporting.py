@@ -32,7 +32,7 @@ def empty_result(
         body: The body whose pose is not known.
         status: One of `kintrack.result.STATUSES`.
         began_s: `time.perf_counter()` when the frame came.
-        reason: Why there is none, if it was skipped.
+        reason: Why there is none.
     """
     n = len(JOINT_NAMES)
     return FrameResult(

@@ -44,7 +44,7 @@ class FrameResult:
     milliseconds: float
     """Time spent on the frame, reading the files left out [ms]."""
     reason: str | None = None
-    """Why the frame was skipped; None for any other status."""
+    """Why there is no pose; None where there is one."""
     iterations: int = 0
     """Solver iterations spent."""
     offsets_m: Float[ndarray, " v"] | None = None

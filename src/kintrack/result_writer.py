@@ -111,13 +111,14 @@ class TrackWriter:
 
     def _write(self, finished: bool) -> Track:
         track = Track.from_frames(self._joint_names, self._frames)
-        reasons = [
-            {"frame": index, "reason": frame.reason}
-            for index, frame in enumerate(self._frames)
-            if frame.status == "skipped"
-        ]
+        skipped, untracked = [], []
+        for index, frame in enumerate(self._frames):
+            if frame.reason is not None:
+                kind = skipped if frame.status == "skipped" else untracked
+                kind.append({"frame": index, "reason": frame.reason})
         track.save(self.folder / TRACK_FILE)
-        summary = self._facts | summarise(track) | {"skipped": reasons, "finished": finished}
+        summary = self._facts | summarise(track) | {"skipped": skipped, "untracked": untracked}
+        summary["finished"] = finished
         write_json(self.folder / SUMMARY_FILE, summary)
         self._written_at_s = time.monotonic()
         return track

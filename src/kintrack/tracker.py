@@ -20,7 +20,7 @@ from kintrack.errors import AssociationError
 from kintrack.geometry import invert_rigid, transform_points
 from kintrack.human import Human
 from kintrack.judge import agreement
-from kintrack.lifecycle import HIDDEN, NOBODY, Life, absent, judged
+from kintrack.lifecycle import HIDDEN, NOBODY, UNFITTED, Life, absent, judged, unbegun
 from kintrack.memory import Memory
 from kintrack.occlusion import hidden_hinges, unseen_hinges
 from kintrack.person import own_pixels, part_pull
@@ -171,21 +171,22 @@ class Tracker(Memory):
         """First frame, or the first after a loss: find the person and fit from several guesses."""
         config, person, machine = self.config, self._fitted, self._lifecycle(observation)
         waits = 0.0 <= frame.timestamp_s - self._failed_s < config.start.retry_s
-        if not (observation.region.any() and self._life.may_begin) or waits:
-            self._life = absent(self._life, machine)
+        in_view, blind = bool(observation.region.any()), observation.labels is None
+        if not (in_view and self._life.may_begin) or waits:
+            self._life = unbegun(self._life, machine, in_view)
             return self._nothing(frame, self._life.status, began)
         found = found_by(person, observation, self.T_world_camera, config, self.labelled.start)
         person, found = in_own_size(person, found, self.T_world_camera, config)
         self._clock("start")
         if found is None:
-            self._life = absent(self._life, machine)
+            self._life = absent(self._life, machine, NOBODY if blind else UNFITTED)
             return self._nothing(frame, self._life.status, began)
         T_camera_world = invert_rigid(self.T_world_camera)
         view = view_skin(person, found.fit.state, T_camera_world, found.observation, config)
         reading = reading_of(found.fit, view, found.agreed, found.observation)
         self._life = judged(self._life, reading, machine)
         if not self._life.tracks:
-            self._failed_s = frame.timestamp_s if observation.labels is None else -np.inf
+            self._failed_s = frame.timestamp_s if blind else -np.inf
             return self._nothing(frame, self._life.status, began)
         return self._meet_at(frame, person, found, began)
 
