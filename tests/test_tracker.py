@@ -8,6 +8,7 @@ import pytest
 from kintrack.body import run_kinematics
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
 from kintrack.joints import JOINT_NAMES
+from kintrack.lifecycle import NOBODY
 from kintrack.raster import rasterise
 from kintrack.skin import skinned_vertices
 from kintrack.start import found_by
@@ -185,7 +186,7 @@ def test_nobody_in_view_is_initialising(scene, quick):
     tracker = Tracker(quick)
     for result in track(tracker, [scene.room(0), scene.room(1)]):
         assert result.status == "initialising"
-        assert np.isnan(result.q).all() and result.reason is None
+        assert np.isnan(result.q).all() and result.reason == NOBODY
         assert result.joint_positions_camera_m.shape == (len(JOINT_NAMES), 3)
 
 
