@@ -111,14 +111,16 @@ class TrackWriter:
 
     def _write(self, finished: bool) -> Track:
         track = Track.from_frames(self._joint_names, self._frames)
-        skipped, untracked = [], []
-        for index, frame in enumerate(self._frames):
-            if frame.reason is not None:
-                kind = skipped if frame.status == "skipped" else untracked
-                kind.append({"frame": index, "reason": frame.reason})
+        why = {
+            name: [
+                {"frame": index, "reason": frame.reason}
+                for index, frame in enumerate(self._frames)
+                if frame.reason is not None and (frame.status == "skipped") == (name == "skipped")
+            ]
+            for name in ("skipped", "untracked")
+        }
         track.save(self.folder / TRACK_FILE)
-        summary = self._facts | summarise(track) | {"skipped": skipped, "untracked": untracked}
-        summary["finished"] = finished
+        summary = self._facts | summarise(track) | why | {"finished": finished}
         write_json(self.folder / SUMMARY_FILE, summary)
         self._written_at_s = time.monotonic()
         return track
