@@ -99,7 +99,7 @@ def test_after_a_rejected_first_pose_some_frames_pass():
         ({"rms_m": 0.04}, "residual 40 mm; 25 are allowed"),
         ({"explained": 0.2}, "20% of the person's points"),
         ({"supported": 0.1}, "10% of the skin is seen"),
-        ({"labels": 0.3}, "30% of the skin lies on pixels of its own part; 55%"),
+        ({"labels": 0.3}, "30% of the skin lies on pixels of its own part; 50%"),
         ({"labels": float("nan")}, "of its own part"),
     ],
 )

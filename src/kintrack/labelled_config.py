@@ -35,7 +35,7 @@ class Limits:
 class LifecycleConfig:
     """When tracking begins and ends."""
 
-    begin: Limits = field(default_factory=lambda: Limits(0.025, 0.7, 0.45, 0.55))
+    begin: Limits = field(default_factory=lambda: Limits(0.025, 0.6, 0.45, 0.5))
     """What a first pose must satisfy."""
     stay: Limits = field(default_factory=lambda: Limits(0.03, 0.5, 0.25, 0.35))
     """What every further frame must satisfy."""
@@ -141,7 +141,7 @@ class LabelledStartConfig:
     """What parts people."""
     headings: int = 12
     """Headings tried, evenly over the circle."""
-    fitted: int = 3
+    fitted: int = 5
     """The best so many guesses are fitted."""
     gate_m: float = 0.25
     """Largest distance in the first rounds of a fit [m]."""
@@ -151,7 +151,7 @@ class LabelledStartConfig:
     """Further associations of the best fit."""
     tilt_rad: float = 0.5
     """How far the pelvis may lean from where a guess has it [rad]."""
-    side_m: float = 0.04
+    side_m: float = 0.06
     """How far a label's left or right is believed against the geometry [m]."""
 
     def __post_init__(self) -> None:

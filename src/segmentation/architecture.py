@@ -27,8 +27,8 @@ HEAD = "logits"
 class Operations(Protocol[T]):
     """All that the networks are made of; every convolution and deconvolution has a bias."""
 
-    def conv(self, name: str, x: T, width: int, relu: bool = True) -> T:
-        """Convolution 3x3 to `width` channels, size kept, then ReLU."""
+    def conv(self, name: str, x: T, width: int, relu: bool = True, reach: int = 1) -> T:
+        """Convolution 3x3 to `width` channels, size kept, then ReLU; taps `reach` pixels apart."""
         ...
 
     def pool(self, x: T) -> T:
@@ -48,17 +48,19 @@ class Operations(Protocol[T]):
         ...
 
 
-def fast_fcn(net: Operations[T], image: T, widths: tuple[int, ...]) -> T:
+def fast_fcn(net: Operations[T], image: T, widths: tuple[int, ...], reach: int = 2) -> T:
     """Fast-FCN [Wan19]: 9 convolutions, 3 poolings, 3 deconvolutions, bottleneck 512 x 13 x 16.
 
-    The paper gives the counts, the bottleneck and "U-Net inspired"; the joins are ours.
+    The paper gives the counts, the bottleneck and "U-Net inspired"; the joins are ours. So is
+    `reach`: with 2, the two convolutions of the bottleneck have their taps 2 and 4 cells apart (Yu
+    & Koltun 2016), and a logit sees 150 pixels of the image instead of 90, at no cost.
     """
     w1, w2, w3, w4 = widths
     a = net.conv("down1", image, w1)  # (64, 106, 128)
     b = net.conv("down2", net.pool(a), w2)  # (128, 53, 64)
     c = net.conv("down3", net.pool(b), w3)  # (256, 26, 32)
-    x = net.conv("middle1", net.pool(c), w4)  # (512, 13, 16)
-    x = net.conv("middle2", x, w4)  # (512, 13, 16)
+    x = net.conv("middle1", net.pool(c), w4, reach=reach)  # (512, 13, 16)
+    x = net.conv("middle2", x, w4, reach=reach**2)  # (512, 13, 16)
     x = net.join(net.deconv("rise3", x, w3, like=c), c)  # (256 + 256, 26, 32)
     x = net.conv("up3", x, w3)  # (256, 26, 32)
     x = net.join(net.deconv("rise2", x, w2, like=b), b)  # (128 + 128, 53, 64)
@@ -115,6 +117,10 @@ def vgg_fcn(net: Operations[T], image: T, widths: tuple[int, ...]) -> T:
 
 DIAGRAMS: dict[str, Callable] = {"fast_fcn": fast_fcn, "unet": unet, "vgg_fcn": vgg_fcn}
 """Networks by name."""
+MOST_REACH = 4
+"""Taps further apart would all lie outside of the bottleneck."""
+DEFAULT_REACH = {"fast_fcn": 2, "unet": 1, "vgg_fcn": 1}
+"""Distance of the bottleneck's taps [cells]."""
 DEFAULT_WIDTHS = {
     "fast_fcn": (64, 128, 256, 512),
     "unet": (64, 128, 256, 512, 1024),
@@ -131,6 +137,8 @@ class NetworkConfig:
     """One of `DIAGRAMS`."""
     widths: tuple[int, ...] = ()
     """Channels per level, finest first; empty for `DEFAULT_WIDTHS`."""
+    reach: int = 0
+    """Distance of the taps in `fast_fcn`'s bottleneck [cells], 1 to 4; 0 for `DEFAULT_REACH`."""
 
     def __post_init__(self) -> None:
         if self.architecture not in DIAGRAMS:
@@ -145,6 +153,13 @@ class NetworkConfig:
             raise SegmentationError(
                 f"widths = {self.widths!r}: {self.architecture} needs {len(usual)} whole numbers "
                 "from 1 to 4096"
+            )
+        if self.reach == 0:
+            object.__setattr__(self, "reach", DEFAULT_REACH[self.architecture])
+        most = MOST_REACH if self.architecture == "fast_fcn" else 1
+        if type(self.reach) is not int or not 1 <= self.reach <= most:
+            raise SegmentationError(
+                f"reach = {self.reach!r}: {self.architecture} takes 1 to {most}, or 0"
             )
 
 
@@ -163,6 +178,8 @@ class Layer(NamedTuple):
     """Side of the square kernel [px]."""
     relu: bool
     """Whether what leaves is rectified."""
+    reach: int
+    """Distance of neighbouring taps [px]."""
     macs: int
     """Multiplications with an addition, cropped border of a deconvolution included."""
 
@@ -195,11 +212,11 @@ class Plan:
     pools: int = 0
     """Max-poolings."""
 
-    def conv(self, name: str, x: Size, width: int, relu: bool = True) -> Size:
+    def conv(self, name: str, x: Size, width: int, relu: bool = True, reach: int = 1) -> Size:
         """See `Operations`."""
         out = Size(width, x.rows, x.columns)
         macs = 9 * x.channels * width * x.rows * x.columns
-        self._note(Layer(name, "conv", x.channels, width, 3, relu, macs), out)
+        self._note(Layer(name, "conv", x.channels, width, 3, relu, reach, macs), out)
         return out
 
     def pool(self, x: Size) -> Size:
@@ -211,7 +228,7 @@ class Plan:
         """See `Operations`."""
         out = Size(width, like.rows, like.columns)
         macs = kernel * kernel * x.channels * width * x.rows * x.columns
-        self._note(Layer(name, "deconv", x.channels, width, kernel, False, macs), out)
+        self._note(Layer(name, "deconv", x.channels, width, kernel, False, 1, macs), out)
         return out
 
     def join(self, a: Size, b: Size) -> Size:
@@ -236,6 +253,8 @@ def plan(config: NetworkConfig) -> Plan:
 
 def draw(config: NetworkConfig, net: Operations[T], image: T) -> T:
     """Run the network's diagram with the given operations; returns the logits."""
+    if config.architecture == "fast_fcn":
+        return fast_fcn(net, image, config.widths, config.reach)
     return DIAGRAMS[config.architecture](net, image, config.widths)
 
 

@@ -46,9 +46,9 @@ class Observer:
     joined: list[tuple[str, str]]
     """Layers that must share a range, as met."""
 
-    def conv(self, name: str, x: Named, width: int, relu: bool = True) -> Named:
+    def conv(self, name: str, x: Named, width: int, relu: bool = True, reach: int = 1) -> Named:
         """See `Operations`."""
-        return self._note(name, self.inner.conv(name, x.value, width, relu))
+        return self._note(name, self.inner.conv(name, x.value, width, relu, reach))
 
     def pool(self, x: Named) -> Named:
         """See `Operations`."""

@@ -41,10 +41,10 @@ class GraphOperations:
         self._tensors = weights.tensors
         self._ranges = weights.ranges if quantised else {}
 
-    def conv(self, name: str, x: Node, width: int, relu: bool = True) -> Node:
+    def conv(self, name: str, x: Node, width: int, relu: bool = True, reach: int = 1) -> Node:
         """See `Operations`."""
         weight = self._weight(name, x, channel=0)
-        out = ops.convolution(x.output, weight, [1, 1], [1, 1], [1, 1], [1, 1])
+        out = ops.convolution(x.output, weight, [1, 1], [reach] * 2, [reach] * 2, [reach] * 2)
         return self._finish(name, self._biased(name, out), relu)
 
     def pool(self, x: Node) -> Node:

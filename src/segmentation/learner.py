@@ -17,7 +17,7 @@ from torch import Tensor, nn
 from segmentation.errors import SegmentationError, WeightsError
 from segmentation.evaluate import N, confusion
 from segmentation.loss import segmentation_loss
-from segmentation.networks import PartNetwork, tensors_of
+from segmentation.networks import PartNetwork, tensors_of, unfold
 from segmentation.training_config import TrainConfig
 from segmentation.weights import Weights
 
@@ -78,12 +78,11 @@ class Learner:
         if start is not None and start.config != config.network:
             raise WeightsError(f"weights of {start.config} cannot begin {config.network}")
         self.config, self.group = config, group
-        normalised = config.normalised and start is None
-        self.network = PartNetwork(config.network, config.seed, normalised)
-        self.average = PartNetwork(config.network, config.seed, normalised)
+        self.network = PartNetwork(config.network, config.seed, config.normalised)
+        self.average = PartNetwork(config.network, config.seed, config.normalised)
         if start is not None:
             for network in (self.network, self.average):
-                _load(network, start.tensors)
+                _load(network, start.tensors, whole=False)
         for network in (self.network, self.average):
             network.to(group.device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average.requires_grad_(False).eval()
@@ -98,6 +97,11 @@ class Learner:
             from torch.nn.parallel import DistributedDataParallel
 
             self._forward = DistributedDataParallel(self.network)
+
+    def unfold(self, images: Float[ndarray, "b 4 106 128"]) -> None:
+        """Let the normalisation of weights to begin with change nothing, see `networks.unfold`."""
+        for network in (self.network, self.average):
+            unfold(network, self._image(torch.from_numpy(images)))
 
     def step(self, images: Tensor, labels: Tensor, rate: float, step: int) -> Tensor:
         """Learn from a batch.
@@ -183,8 +187,9 @@ def _takes_bf16(config: TrainConfig, device: torch.device) -> bool:
     return bool(torch.ops.mkldnn._is_mkldnn_bf16_supported())
 
 
-def _load(network: PartNetwork, tensors: Mapping[str, ndarray]) -> None:
-    network.load_state_dict({k: torch.from_numpy(np.array(v)) for k, v in tensors.items()})
+def _load(network: PartNetwork, tensors: Mapping[str, ndarray], whole: bool = True) -> None:
+    state = {k: torch.from_numpy(np.array(v)) for k, v in tensors.items()}
+    network.load_state_dict(state, strict=whole)
 
 
 def _below(tensors: Mapping[str, ndarray], prefix: str) -> dict[str, ndarray]:

@@ -24,9 +24,9 @@ class PartNetwork(nn.Module):
     """One of the three networks; its layers bear the names of the diagram.
 
     He's initialisation keeps the second moment of the input, which `preprocess.py` makes about 1,
-    through all layers (He et al. 2015). A network that is trained from random weights normalises
-    every layer but the last over the batch (Ioffe & Szegedy 2015); `folded` takes that out again,
-    so that what is kept and run has no layer beyond the diagram's.
+    through all layers (He et al. 2015). A network that is trained normalises every layer but the
+    last over the batch (Ioffe & Szegedy 2015); `folded` takes that out again, so that what is kept
+    and run has no layer beyond the diagram's. `unfold` puts it into trained weights.
     """
 
     def __init__(self, config: NetworkConfig, seed: int | None = None, normalised: bool = False):
@@ -89,6 +89,34 @@ def folded(network: PartNetwork) -> dict[str, np.ndarray]:
     return out
 
 
+def unfold(network: PartNetwork, images: Float[Tensor, "b 4 106 128"]) -> None:
+    """Let every normalisation begin where it changes nothing.
+
+    Layer after layer takes mean and deviation of a batch as its statistics, and gives them back as
+    shift and scale; training then goes on as if the network had been normalised from the start.
+
+    Args:
+        network: A normalised network whose layers have trained weights; it is changed.
+        images: What its statistics are taken from.
+    """
+
+    def begin(norm: nn.Module, inputs: tuple[Tensor, ...]) -> None:
+        assert isinstance(norm, nn.BatchNorm2d)
+        var, mean = torch.var_mean(inputs[0].float(), (0, 2, 3), correction=0)
+        statistics = {"running_mean": mean, "running_var": var}
+        scales = {"weight": torch.sqrt(var + norm.eps), "bias": mean}
+        norm.load_state_dict(statistics | scales, strict=False)
+
+    norms = [module for module in network.modules() if isinstance(module, nn.BatchNorm2d)]
+    hooks = [norm.register_forward_pre_hook(begin) for norm in norms]
+    trains = network.training
+    with torch.no_grad():
+        network.eval()(images)
+    network.train(trains)
+    for hook in hooks:
+        hook.remove()
+
+
 class TorchOperations:
     """The diagram's operations on torch tensors, with a network's weights."""
 
@@ -96,7 +124,7 @@ class TorchOperations:
         """Use the layers of this network."""
         self._layers = dict(network.named_children())
 
-    def conv(self, name: str, x: Tensor, width: int, relu: bool = True) -> Tensor:
+    def conv(self, name: str, x: Tensor, width: int, relu: bool = True, reach: int = 1) -> Tensor:
         """See `Operations`."""
         out = self._normalised(name, self._layers[name](x))
         return F.relu(out) if relu else out
@@ -129,7 +157,10 @@ def _module(layer: Layer, generator: torch.Generator | None) -> nn.Module:
     """
     module: nn.Conv2d | nn.ConvTranspose2d
     if layer.kind == "conv":
-        module = nn.Conv2d(layer.inputs, layer.outputs, layer.kernel, padding=layer.kernel // 2)
+        pad = layer.kernel // 2 * layer.reach
+        module = nn.Conv2d(
+            layer.inputs, layer.outputs, layer.kernel, padding=pad, dilation=layer.reach
+        )
         fan_in = layer.inputs * layer.kernel**2
     else:
         crop = (layer.kernel - 2) // 2

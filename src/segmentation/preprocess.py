@@ -7,7 +7,8 @@ The whole image is fitted in, aspect kept; bars fill the rest. The depth plane h
 
 the logarithm of the metres that one pixel spans. It says how large a person is in the picture
 whatever the focal length, and moving a scene away, or another lens, only adds a constant: the
-relief of a surface, which is a ratio of depths, stays. A hole is `HOLE`, beyond every reading.
+relief of a surface, which is a ratio of depths, stays, and is enlarged (`relief.py`). A hole is
+`HOLE`, beyond every reading.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from kintrack.geometry import LABELS
 from kintrack.sequence.frame import Frame
 from segmentation.errors import InputError
 from segmentation.labels import IGNORED, INPUT_CHANNELS, INPUT_HEIGHT, INPUT_WIDTH
+from segmentation.relief import add_relief
 
 REFERENCE_DEPTH_M = 2.5
 """d_0: a person a Kinect v2 sees from head to foot stands about here; D is 0 [m]."""
@@ -39,7 +41,7 @@ HOLE = 4.0
 COLOR_MIDDLE, COLOR_SCALE = 127.5, 64.0
 """A colour plane is (value - middle) / scale; all 0 means that there is no colour."""
 
-SPECIFICATION = "RGBD 128x106, metres per pixel, version 1"
+SPECIFICATION = "RGBD 128x106, metres per pixel, relief, version 2"
 """Names all of the above; goes into weights files, since weights fit only one of them."""
 
 MIN_SIDE_PX = 16
@@ -131,7 +133,9 @@ def network_input(
                          f"{fit.height} px: they must be the same size")  # fmt: skip
     out = np.zeros((len(INPUT_CHANNELS), INPUT_HEIGHT, INPUT_WIDTH), dtype=np.float32)
     unit = REFERENCE_DEPTH_M * focal_px * fit.scale / REFERENCE_FOCAL_PX
-    _fill_depth(depth, fit, unit, out[3])
+    plane = np.full((INPUT_HEIGHT, INPUT_WIDTH), HOLE, dtype=np.float32)
+    _fill_depth(depth, fit, unit, plane)
+    add_relief(plane, FARTHEST, out[3])
     if color is not None:
         if color.shape != (*depth.shape, 3) or color.dtype != np.uint8:
             raise InputError(
@@ -227,7 +231,6 @@ def _samples(cells, pixels):
 
 @njit(cache=True)
 def _fill_depth(depth, fit, unit, out):
-    out[:] = HOLE
     rows, down = _samples(fit.rows, fit.height)
     columns, across = _samples(fit.columns, fit.width)
     found = np.empty(SAMPLES * SAMPLES, dtype=np.float32)

@@ -170,6 +170,7 @@ def tuning_config(config: TrainConfig, tuning: TuningConfig, start: Weights) -> 
         network=start.config,
         hours=tuning.minutes / 60.0,
         rate=tuning.rate,
+        normalised=False,
         warmup_steps=min(config.warmup_steps, WARMUP_STEPS),
         validation_steps=min(config.validation_steps, VALIDATION_STEPS),
         validation_frames=min(config.validation_frames, VALIDATION_FRAMES),

@@ -40,6 +40,8 @@ WEIGHTS_FILE, RUN_FILE = "weights.safetensors", "run.json"
 VALIDATION_BATCH = 16
 CALIBRATION_FRAMES = 200
 """Training frames from which int8 ranges are found; every other one is changed."""
+UNFOLDED = 64
+"""Samples from which the normalisation of weights to begin with takes its statistics."""
 ENDLESS = 1 << 40
 
 
@@ -91,6 +93,8 @@ def train(
     """
     group = join_group(config)
     learner = Learner(config, group, start)
+    if start is not None and config.normalised:
+        learner.unfold(Batches(data.train, config.augment, bank, UNFOLDED, config.seed)[0][0])
     identity = {
         "config": config.identity(),
         "data": [data.train.crc(), data.validation.crc()],

@@ -48,8 +48,7 @@ class TrainConfig:
     average: float = 0.999
     """Decay of the moving average of the weights, which is what is kept."""
     normalised: bool = True
-    """Batch normalisation while training, folded into the weights that are kept; never where
-    training begins with weights."""
+    """Batch normalisation while training, folded into the weights that are kept."""
     seed: int = 0
     """Draws weights, order and changes."""
     augment: AugmentConfig = field(default_factory=AugmentConfig)

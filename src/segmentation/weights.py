@@ -122,6 +122,7 @@ def _facts(config: NetworkConfig) -> dict[str, Any]:
         "version": VERSION,
         "architecture": config.architecture,
         "widths": list(config.widths),
+        "reach": config.reach,
         "labels": list(LABELS),
         "input": SPECIFICATION,
     }
@@ -145,7 +146,7 @@ def _config(path: Path, facts: Mapping[str, Any]) -> NetworkConfig:
         if facts.get(key) != expected:
             raise WeightsError(f"{path}: {key} = {facts.get(key)}; {expected} is needed")
     try:
-        return NetworkConfig(facts["architecture"], tuple(facts["widths"]))
+        return NetworkConfig(facts["architecture"], tuple(facts["widths"]), facts.get("reach", 1))
     except (KeyError, TypeError, SegmentationError) as error:
         raise WeightsError(f"{path} does not say which network it is for: {error}") from None
 

@@ -132,7 +132,8 @@ def rewritten(path, **facts):
     ("facts", "words"),
     [({"labels": ["background", "person"]}, "labels = .*'person'.* is needed"),
      ({"input": "RGBD 64x53"}, "input = RGBD 64x53"),
-     ({"architecture": "unet", "widths": [4, 6, 8, 8, 8]}, "unet weights, fast_fcn ones are")],
+     ({"architecture": "unet", "widths": [4, 6, 8, 8, 8], "reach": 1},
+       "unet weights, fast_fcn ones are")],
 )  # fmt: skip
 def test_start_weights_that_do_not_fit_are_named_before_any_work(tmp_path, facts, words):
     record(tmp_path / "a", frames=2)

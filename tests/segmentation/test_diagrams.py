@@ -65,3 +65,17 @@ def test_an_unknown_architecture_is_named_with_the_known_ones():
 def test_widths_that_make_no_network_are_named(widths):
     with pytest.raises(SegmentationError, match=r"widths = .*fast_fcn needs 4 whole numbers"):
         NetworkConfig("fast_fcn", widths)
+
+
+@pytest.mark.parametrize("architecture, reach", [("fast_fcn", 5), ("fast_fcn", -1), ("unet", 2)])
+def test_a_reach_that_makes_no_network_is_named(architecture, reach):
+    with pytest.raises(SegmentationError, match=f"reach = {reach}: {architecture} takes 1 to"):
+        NetworkConfig(architecture, reach=reach)
+
+
+def test_only_the_bottleneck_of_fast_fcn_reaches_further():
+    reaches = {layer.name: layer.reach for layer in plan(NetworkConfig("fast_fcn")).layers}
+    assert (reaches.pop("middle1"), reaches.pop("middle2")) == (2, 4)
+    assert set(reaches.values()) == {1}
+    far, near = NetworkConfig("fast_fcn", reach=2), NetworkConfig("fast_fcn", reach=1)
+    assert count_flops(far) == count_flops(near) and count_parameters(far) == count_parameters(near)

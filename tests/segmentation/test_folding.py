@@ -7,7 +7,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from segmentation.architecture import DEFAULT_WIDTHS, NetworkConfig  # noqa: E402
-from segmentation.networks import PartNetwork, folded  # noqa: E402
+from segmentation.networks import PartNetwork, folded, unfold  # noqa: E402
 
 ARCHITECTURES = sorted(DEFAULT_WIDTHS)
 
@@ -58,3 +58,28 @@ def test_every_layer_but_the_last_is_normalised():
     network = PartNetwork(slim("fast_fcn"), 0, normalised=True)
     norms = [m for m in network.modules() if isinstance(m, torch.nn.BatchNorm2d)]
     assert len(norms) == 9 + 3 - 1
+
+
+@pytest.mark.parametrize("architecture", ARCHITECTURES)
+def test_trained_weights_compute_the_same_once_they_are_normalised(architecture):
+    config = slim(architecture)
+    plain, network = PartNetwork(config, 4).eval(), PartNetwork(config, 5, normalised=True)
+    network.load_state_dict(plain.state_dict(), strict=False)
+    images = torch.from_numpy(np.random.default_rng(2).normal(size=(6, 4, 106, 128))).float()
+    unfold(network, images)
+    with torch.no_grad():
+        expected, whole = plain(images), network.train()(images)
+        again = network.eval()(images)
+    limit = 1e-4 * float(expected.abs().max())
+    assert torch.allclose(expected, whole, atol=limit)
+    assert torch.allclose(expected, again, atol=0.05 * float(expected.abs().max()))
+
+
+def test_statistics_are_those_of_the_batch_and_scales_undo_them():
+    network = PartNetwork(slim("fast_fcn"), 5, normalised=True)
+    unfold(network, torch.ones((2, 4, 106, 128)) * torch.arange(128.0))
+    norm = network.get_submodule("down1_norm")
+    assert torch.allclose(norm.bias, norm.running_mean)
+    assert torch.allclose(norm.weight, torch.sqrt(norm.running_var + norm.eps))
+    assert float(norm.running_var.max()) > 1.0
+    assert network.training

@@ -57,6 +57,18 @@ def test_random_weights_neither_quench_nor_blow_up_what_the_layers_pass_on(archi
     assert logits.std() < 0.5
 
 
+def test_a_logit_sees_further_where_the_bottleneck_reaches_further():
+    """Width of what one logit in the middle depends on."""
+    seen = {}
+    for reach in (1, 2):
+        network = PartNetwork(NetworkConfig("fast_fcn", SLIM_WIDTHS["fast_fcn"], reach), 0)
+        image = torch.randn(1, 4, 106, 128, requires_grad=True)
+        network(image)[0, :, 53, 64].sum().backward()
+        columns = torch.nonzero(image.grad.abs().sum((0, 1, 2)))
+        seen[reach] = int(columns.max() - columns.min()) + 1
+    assert seen[1] < 100 < seen[2]
+
+
 @pytest.mark.parametrize("architecture", DIAGRAMS)
 def test_every_parameter_gets_a_gradient(architecture):
     network = slim(architecture)

@@ -98,7 +98,7 @@ def test_a_network_that_cannot_be_is_named(path, entry):
 
 
 def test_tensors_of_another_network_are_named(path):
-    rewrite(path, architecture="unet", widths=[8, 16, 24, 32, 40])
+    rewrite(path, architecture="unet", widths=[8, 16, 24, 32, 40], reach=1)
     with pytest.raises(WeightsError, match=r"no down1a.bias, .*which .*unet"):
         load_weights(path)
 
@@ -106,6 +106,20 @@ def test_tensors_of_another_network_are_named(path):
 def test_tensors_of_other_widths_are_named(path):
     rewrite(path, widths=[8, 16, 24, 64])
     with pytest.raises(WeightsError, match=r"middle1.weight .*\(32, 24.*\(64, 24"):
+        load_weights(path)
+
+
+def test_weights_written_before_there_was_a_reach_have_none(path):
+    with safe_open(path, framework="numpy") as file:
+        facts = json.loads(file.metadata()[ENTRY])
+    del facts["reach"]
+    path.write_bytes(save(load(path.read_bytes()), {ENTRY: json.dumps(facts)}))
+    assert load_weights(path).config.reach == 1
+
+
+def test_a_reach_that_makes_no_network_is_refused(path):
+    rewrite(path, reach=9)
+    with pytest.raises(WeightsError, match="reach = 9"):
         load_weights(path)
 
 
