@@ -34,6 +34,7 @@ LABELLING = (
     "networks",
     "preprocess",
     "region",
+    "relief",
     "runtime",
     "tracking",
 )
