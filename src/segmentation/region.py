@@ -29,8 +29,6 @@ LEAST_AREA_M2 = 0.02
 """A smaller patch is nobody: half a face [m^2]."""
 REACH_M, BEHIND_M = 1.3, 0.7
 """What lies so far beside, and so far before or behind, the largest patch is hers too [m]."""
-
-
 SEARCH_SHARE = 0.62
 """Height of the windows in which somebody is searched for, share of the image."""
 SEARCH_STEP = 0.7
@@ -91,6 +89,7 @@ def search_window(turn: int, width: int, height: int, focal_px: float) -> Window
     """
     rows_px = SEARCH_SHARE * height
     columns_px = rows_px * INPUT_WIDTH / INPUT_HEIGHT
+    # a column more for less than a twentieth of a step would show what the others show
     count = max(0, math.ceil((width - columns_px) / (SEARCH_STEP * columns_px) - 0.05)) + 1
     column, row = turn % count, turn // count % 2
     across = 0.5 if count == 1 else column / (count - 1)

@@ -184,7 +184,7 @@ def _draw_scores(axes, scores) -> None:
 
 
 def _sheet(shown: Sequence[Shown]) -> UInt8[ndarray, "h w 3"]:
-    """Depth, truth, before and after around the person; two pictures a row."""
+    """The network's depth, truth, before and after around the person; two pictures a row."""
     tiles = []
     for one in shown:
         plane = one.sample.image[3]

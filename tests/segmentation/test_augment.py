@@ -53,7 +53,15 @@ def test_depth_labels_and_colour_stay_together_under_zoom_shift_and_roll(seed):
     assert agrees(view) > 0.9
 
 
-def test_a_picture_as_it_is_gives_the_input_that_the_whole_frame_gives():
+@pytest.fixture
+def level(monkeypatch):
+    """The depth plane without relief, which a half cell's shift moves along."""
+    monkeypatch.setattr(
+        "segmentation.preprocess.add_relief", lambda plane, farthest, out: np.copyto(out, plane)
+    )
+
+
+def test_a_picture_as_it_is_gives_the_input_that_the_whole_frame_gives(level):
     for size in ((512, 424), (640, 480), (320, 240)):
         rng = np.random.default_rng(1)
         v, u = np.mgrid[: size[1], : size[0]] / size[0]
@@ -63,8 +71,7 @@ def test_a_picture_as_it_is_gives_the_input_that_the_whole_frame_gives():
         mine = plain_sample(reduced(depth, color, labels, 0.7 * size[0])).image
         true = network_input(depth, 0.7 * size[0], color)
         assert ((mine == HOLE) == (true == HOLE)).all()
-        off = np.abs(mine[3] - true[3])
-        assert np.quantile(off, 0.8) < 0.02 and np.quantile(off, 0.95) < 0.2
+        assert np.quantile(np.abs(mine[3] - true[3]), 0.95) < 0.02
 
 
 def test_mirroring_swaps_left_and_right():
@@ -78,8 +85,8 @@ def test_mirroring_swaps_left_and_right():
     assert (arm < torso) == (arm_m < torso_m)
 
 
-def test_zooming_in_looks_like_coming_nearer():
-    """Metres per pixel at twice the zoom are those at half the distance; relief hardly differs."""
+def test_zooming_in_looks_like_coming_nearer(level):
+    """Metres per pixel at twice the zoom are those at half the distance."""
     depth, color, labels = figure(0)
     far, near = (Picture(k * depth, color, labels, CAMERA.fx) for k in (1.0, 0.5))
     zoomed = warped(far, Warp(2 * 2 / 3, (95.5, 79.0)))
@@ -88,7 +95,7 @@ def test_zooming_in_looks_like_coming_nearer():
     for label in (2, 5):
         seen, expected = zoomed.labels == label, plain_sample(near).labels == label
         if seen.sum() > 20:
-            assert np.median(D[seen]) == pytest.approx(np.median(D_near[expected]), abs=0.3)
+            assert np.median(D[seen]) == pytest.approx(np.median(D_near[expected]), abs=1e-3)
     assert (zoomed.labels == 2).sum() > 20
 
 
