@@ -29,10 +29,6 @@ LEAST_AREA_M2 = 0.02
 """A smaller patch is nobody: half a face [m^2]."""
 REACH_M, BEHIND_M = 1.3, 0.7
 """What lies so far beside, and so far before or behind, the largest patch is hers too [m]."""
-SEARCH_SHARE = 0.62
-"""Height of the windows in which somebody is searched for, share of the image."""
-SEARCH_STEP = 0.7
-"""They lie at most so far apart, share of their width."""
 
 
 class Window(NamedTuple):
@@ -76,29 +72,6 @@ def window(region: Region, width: int, height: int, focal_px: float) -> Window |
     (u0, u1, columns, left), (v0, v1, rows, top) = spans
     fit = Letterbox(u1 - u0, v1 - v0, columns, rows, left, top)
     return Window(slice(v0, v1), slice(u0, u1), fit)
-
-
-def search_window(turn: int, width: int, height: int, focal_px: float) -> Window | None:
-    """One of the windows that cover an image together, for people too small for the whole image.
-
-    Args:
-        turn: Which; any number, they come round and round.
-        width: Image width [px].
-        height: Image height [px].
-        focal_px: Focal length [px].
-    """
-    rows_px = SEARCH_SHARE * height
-    columns_px = rows_px * INPUT_WIDTH / INPUT_HEIGHT
-    # a column more for less than a twentieth of a step would show what the others show
-    count = max(0, math.ceil((width - columns_px) / (SEARCH_STEP * columns_px) - 0.05)) + 1
-    column, row = turn % count, turn // count % 2
-    across = 0.5 if count == 1 else column / (count - 1)
-    center = (
-        0.5 * width + (across - 0.5) * (width - columns_px),
-        0.5 * height + (row - 0.5) * (height - rows_px),
-    )
-    depth_m = WINDOW_M * focal_px / rows_px
-    return window(Region(center, depth_m), width, height, focal_px)
 
 
 def region_of_person(

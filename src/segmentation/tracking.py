@@ -16,7 +16,7 @@ from segmentation.errors import InputError
 from segmentation.evaluate import true_labels
 from segmentation.labels import BACKGROUND, IGNORED
 from segmentation.preprocess import Letterbox, letterbox, network_input
-from segmentation.region import Window, region_of_person, search_window, window
+from segmentation.region import Window, region_of_person, window
 from segmentation.runtime import NetworkSegmenter, RuntimeConfig, labels_of, load_segmenter
 from segmentation.weights import SHIPPED
 
@@ -42,10 +42,7 @@ def image_segmenter(
 
 @dataclass(frozen=True)
 class ImageSegmenter:
-    """A network that looks at the whole image first and then closer at the person.
-
-    Where it sees nobody, it searches one part of the image after the other, one a frame.
-    """
+    """A network that looks at the whole image first and then closer at the person."""
 
     network: NetworkSegmenter
     """Labels the network's picture."""
@@ -82,10 +79,6 @@ class ImageSegmenter:
                 return out
             assert frame.depth_m is not None
             found = region_of_person(out, frame.depth_m, focal)
-            part = search_window(frame.index, width, height, focal) if found is None else None
-            if part is not None:
-                self._look(frame, part, step, out)
-                found = region_of_person(out, frame.depth_m, focal)
             view = None if found is None else window(found, width, height, focal)
             if view is None:
                 return out

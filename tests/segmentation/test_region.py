@@ -10,7 +10,6 @@ from segmentation.region import (
     WINDOW_M,
     cells_per_pixel,
     region_of_person,
-    search_window,
     window,
 )
 
@@ -48,22 +47,6 @@ def test_the_window_lies_in_the_image_and_the_piece_where_it_belongs(center, dep
 
 def test_a_region_outside_the_image_has_no_window():
     assert window(Region((2000.0, 100.0), 2.0), 512, 424, FOCAL) is None
-
-
-@pytest.mark.parametrize("size", [(320, 240), (512, 424), (1280, 720), (480, 640), (106, 128)])
-def test_a_search_sees_the_whole_image_and_everybody_small_in_one_piece(size):
-    """Wherever somebody half as high and a fifth as wide as the image is tall stands."""
-    width, height = size
-    views = [search_window(turn, width, height, FOCAL) for turn in range(12)]
-    assert len({str(view) for view in views}) <= 8
-    for left in range(0, width - height // 5 + 1, 7):
-        for top in (0, height // 4, height // 2):
-            inside = [
-                v.columns.start <= left + 2 and left + height // 5 - 2 <= v.columns.stop
-                and v.rows.start <= top + 2 and top + height // 2 - 2 <= v.rows.stop
-                for v in views
-            ]  # fmt: skip
-            assert any(inside) or top == height // 4
 
 
 def scene(*people):

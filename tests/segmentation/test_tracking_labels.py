@@ -61,43 +61,6 @@ def test_the_second_look_is_a_closer_one_and_sharper():
     assert off.sum() < (once != np.where(shown.depth_m < 3, 2, 0)).sum()
 
 
-class Nearsighted(Patches):
-    """The same, but it overlooks whoever is small in its picture."""
-
-    def logits_of(self, image):
-        out = super().logits_of(image)
-        if (out.argmax(0) == 2).sum() < 800:
-            out[:] = 0.0
-        return out
-
-
-def small_person():
-    """Somebody 4 m away in the lower right of a frame."""
-    shown = frame(512, 424)
-    depth = np.full((424, 512), 5.0, np.float32)
-    depth[280:380, 400:480] = 4.0
-    return replace(shown, depth_m=depth)
-
-
-def test_somebody_too_small_for_the_whole_image_is_found_by_searching():
-    shown = small_person()
-    once = checked_labels(ImageSegmenter(Nearsighted(), closer=False), shown)
-    assert not once.any()
-    searched = [
-        checked_labels(ImageSegmenter(Nearsighted()), replace(shown, index=n)) for n in range(4)
-    ]
-    found = [labels_of_pixels(labels, shown.depth_m) == 2 for labels in searched]
-    shares = [patch[280:380, 400:480].mean() for patch in found]
-    assert max(shares) > 0.95 and min(shares) == 0.0
-    assert all(patch.sum() - patch[275:385, 395:485].sum() == 0 for patch in found)
-
-
-def test_a_frame_without_anybody_takes_two_looks():
-    network = Nearsighted()
-    checked_labels(ImageSegmenter(network), frame(320, 240))
-    assert len(network.seen) == 2
-
-
 def test_a_known_region_takes_one_look_and_is_blind_to_all_else():
     network, shown = Patches(), person(512, 424)
     shown.depth_m[:, -20:] = 2.0
