@@ -12,7 +12,7 @@ the layer it is `like`: an odd row comes back because one row less is cropped at
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import NamedTuple, Protocol, TypeVar
 
 from segmentation.errors import SegmentationError
@@ -161,6 +161,17 @@ class NetworkConfig:
             raise SegmentationError(
                 f"reach = {self.reach!r}: {self.architecture} takes 1 to {most}, or 0"
             )
+
+    @classmethod
+    def left_open(cls) -> NetworkConfig:
+        """A default for command lines: what is not given follows the architecture that is.
+
+        It is no network until `replace` or a constructor has settled it.
+        """
+        made = cls()
+        for entry in fields(cls):
+            object.__setattr__(made, entry.name, entry.default)
+        return made
 
 
 class Layer(NamedTuple):

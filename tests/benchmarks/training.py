@@ -4,7 +4,7 @@
 Data are made, networks trained one after the other in out/training/; a stopped run goes on.
 
     python tests/benchmarks/training.py ship
-    python tests/benchmarks/training.py compare --steps 20000
+    python tests/benchmarks/training.py compare --steps 20000 --processes 2
 
 `compare` trains Fast-FCN, U-Net and VGG-FCN, Fast-FCN without inserted objects, and Fast-FCN with
 other weights of the background modifier, all on the same data and for as many steps, and writes
@@ -77,12 +77,12 @@ def main() -> int:
     shared = ["--batch", str(arguments.batch), "--seed", str(arguments.seed)]
     if arguments.what == "ship":
         length = ["--steps", "4"] if arguments.quick else ["--hours", str(arguments.hours)]
-        made = _train(folder, Recipe("ship", SHIPPED), [*shared, *length], arguments.quick)
+        made = _train(folder, Recipe("ship", SHIPPED), [*shared, *length], arguments)
         print(f"written: {made}")
         return 0
     steps = 4 if arguments.quick else arguments.steps
     files = {
-        recipe.name: _train(folder, recipe, [*shared, "--steps", str(steps)], arguments.quick)
+        recipe.name: _train(folder, recipe, [*shared, "--steps", str(steps)], arguments)
         for recipe in COMPARED
     }
     pairs = " ".join(f"{name}={path}" for name, path in files.items() if "lambda" not in name)
@@ -106,10 +106,12 @@ def _arguments() -> argparse.Namespace:
     made.add_argument("--steps", type=int, default=20_000, help="length of each of `compare`")
     made.add_argument("--batch", type=int, default=16)
     made.add_argument("--seed", type=int, default=0)
+    made.add_argument("--processes", type=int, default=1, help="one for each core or GPU")
     made.add_argument("--quick", action="store_true", help="tiny networks; docs/ is left as it is")
     found = made.parse_args()
-    if found.what == "compare" and found.steps < 1:
-        raise ResultError(f"--steps {found.steps}: at least 1 is needed")
+    for name in ("steps", "processes"):
+        if getattr(found, name) < 1:
+            raise ResultError(f"--{name} {getattr(found, name)}: at least 1 is needed")
     return found
 
 
@@ -125,24 +127,31 @@ def _build(folder: Path, data: Path, frames: int, quick: bool) -> None:
                   "--frames", str(PAPER_FRAMES))  # fmt: skip
 
 
-def _train(folder: Path, recipe: Recipe, options: Sequence[str], quick: bool) -> Path:
+def _train(
+    folder: Path, recipe: Recipe, options: Sequence[str], arguments: argparse.Namespace
+) -> Path:
     """Weights of a run, which goes on where it was stopped."""
     path = folder / recipe.name / WEIGHTS_FILE
-    widths = (QUICK_WIDTHS if quick else WIDTHS)[recipe.architecture]
+    widths = (QUICK_WIDTHS if arguments.quick else WIDTHS)[recipe.architecture]
+    parts = () if arguments.quick else PAPER_PARTS
     if not path.is_file():
-        less = ["--bank.cutouts", "4", "--bank.rooms", "2"] if quick else []
+        less = ["--bank.cutouts", "4", "--bank.rooms", "2"] if arguments.quick else []
+        threads = [] if arguments.processes == 1 else ["--threads", "1"]
         _kintrack(
-            folder, "train", "training", *(() if quick else PAPER_PARTS), "-o", recipe.name,
-            "--cache", "cache", "--network.architecture", recipe.architecture,
-            "--network.widths", *widths.split(), *options, *recipe.options, *less,
+            folder, "train", "training", *parts, "-o", recipe.name, "--cache", "cache",
+            "--network.architecture", recipe.architecture, "--network.widths", *widths.split(),
+            *options, *recipe.options, *less, *threads, processes=arguments.processes,
         )  # fmt: skip
     return path
 
 
-def _kintrack(folder: Path, *words: str) -> None:
+def _kintrack(folder: Path, *words: str, processes: int = 1) -> None:
     """Run a command in a folder, so that weights files tell no paths beyond it."""
-    command = Path(sys.executable).with_name("kintrack")
-    done = subprocess.run([str(command), *words], cwd=folder, check=False)
+    command = [str(Path(sys.executable).with_name("kintrack")), *words]
+    if processes > 1:
+        launch = ["-m", "torch.distributed.run", "--standalone", "--nproc-per-node"]
+        command = [sys.executable, *launch, str(processes), *command]
+    done = subprocess.run(command, cwd=folder, check=False)
     if done.returncode == 130:
         raise KeyboardInterrupt
     if done.returncode:

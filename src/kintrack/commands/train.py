@@ -8,7 +8,7 @@ import sys
 import zlib
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,6 +20,7 @@ from kintrack.commands.console import StepProgress, console
 from kintrack.commands.recording import Recording
 from kintrack.commands.tuning import tune
 from kintrack.errors import ConfigError
+from segmentation.architecture import NetworkConfig
 from segmentation.augment.bank import BankConfig
 from segmentation.recordings import TuningConfig
 from segmentation.training_config import TrainConfig
@@ -30,6 +31,10 @@ if TYPE_CHECKING:
     from segmentation.evaluate import Scores
     from segmentation.prepared import Prepared
     from segmentation.train import TrainProgress
+
+
+def _default() -> TrainConfig:
+    return TrainConfig(network=NetworkConfig.left_open())
 
 
 @dataclass(frozen=True)
@@ -56,8 +61,12 @@ class Train:
     """How weights are adapted with --from-recordings."""
     recording: Annotated[Recording, tyro.conf.OmitArgPrefixes] = field(default_factory=Recording)
     """How to read the recordings of --from-recordings."""
-    config: Annotated[TrainConfig, tyro.conf.arg(name="")] = field(default_factory=TrainConfig)
+    config: Annotated[TrainConfig, tyro.conf.arg(name="")] = field(default_factory=_default)
     """How to train."""
+
+    def __post_init__(self) -> None:
+        network = replace(self.config.network)
+        object.__setattr__(self, "config", replace(self.config, network=network))
 
     def run(self) -> None:
         """Pack, render, train with progress; Ctrl-C leaves a checkpoint."""
