@@ -19,7 +19,7 @@ class Returns:
         return self.labels
 
 
-@pytest.mark.parametrize("shape", [(96, 128), (240, 320), (106, 142)])
+@pytest.mark.parametrize("shape", [(96, 128), (240, 320), (106, 142), (2, 96, 128)])
 def test_a_map_of_the_whole_image_passes_in_any_size(shape):
     labels = np.full(shape, 6, dtype=np.uint8)
     assert checked_labels(Returns(labels), FRAME) is labels
@@ -33,6 +33,7 @@ def test_a_map_of_the_whole_image_passes_in_any_size(shape):
         (np.zeros((3, 4), np.uint8), "at least 16"),
         (np.full((96, 128), np.nan), "float64"),
         (np.zeros((96, 128, 1), np.uint8), r"\(96, 128, 1\)"),
+        (np.zeros((1, 96, 128), np.uint8), r"\(1, 96, 128\)"),
         (np.full((96, 128), 7, np.uint8), "label 7: 0 to 6"),
         (None, "NoneType"),
     ],

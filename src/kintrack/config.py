@@ -43,6 +43,9 @@ class AssociationConfig:
     part_m: float = 0.08
     """Skin pairs with a pixel of another part as if that were further away by this, squares added;
     never with background. 10 for the hard gate of the paper [m]."""
+    doubt_m: float = 0.06
+    """A pixel of which a network is not sure takes the second label if the skin of that is expected
+    this near to it; 0 for never [m]."""
     side_m: float = 0.08
     """A limb's pixel goes to the other side's limb if that is nearer by about this [m]."""
 
@@ -62,6 +65,7 @@ class AssociationConfig:
             background_share=(0.0, 1.0),
             region_margin_m=(0.05, 5.0),
             part_m=(0.0, 10.0),
+            doubt_m=(0.0, 1.0),
             side_m=(0.0, 10.0),
         )
 

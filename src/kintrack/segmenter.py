@@ -34,10 +34,12 @@ class Segmenter(Protocol):
         """What it is, for the result's summary."""
         ...
 
-    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
+    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "*guess r c"]:
         """Label map that covers the whole image, in any size with the image's aspect.
 
-        With a region, nobody will ask about people elsewhere.
+        Two of them, shape (2, R, C), also say what each label would be if it were not the first:
+        the first again where that is beyond doubt. With a region, nobody will ask about people
+        elsewhere.
         """
         ...
 
@@ -48,14 +50,14 @@ class Watched:
     def __init__(self, segmenter: Segmenter):
         """Watch a segmenter."""
         self._segmenter = segmenter
-        self.last: UInt8[ndarray, "r c"] | None = None
+        self.last: UInt8[ndarray, "*guess r c"] | None = None
 
     @property
     def name(self) -> str:
         """What the segmenter is."""
         return self._segmenter.name
 
-    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
+    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "*guess r c"]:
         """What the segmenter says."""
         self.last = self._segmenter.segment(frame, region)
         return self.last
@@ -73,7 +75,7 @@ class Told:
         """What the other one is."""
         return self._watched.name
 
-    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
+    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "*guess r c"]:
         """Its last labels, which must be the frame's."""
         assert self._watched.last is not None
         return self._watched.last
@@ -103,7 +105,7 @@ def region_of(points_camera: Float[ndarray, "n 3"], camera: PinholeCamera) -> Re
 
 def checked_labels(
     segmenter: Segmenter, frame: Frame, region: Region | None = None
-) -> UInt8[ndarray, "r c"]:
+) -> UInt8[ndarray, "*guess r c"]:
     """What a segmenter says of a frame, once it is known to be a label map of it.
 
     Args:
@@ -112,21 +114,24 @@ def checked_labels(
         region: Where the person is; None if that is not known.
 
     Returns:
-        Labels 0 to 6, shape (R, C), spread over the whole image.
+        Labels 0 to 6, shape (R, C) or (2, R, C), spread over the whole image.
 
     Raises:
         SegmenterError: if type, size or a value is wrong.
     """
     labels = segmenter.segment(frame, region)
     who = f"{type(segmenter).__name__} returned for frame {frame.index}"
-    if not isinstance(labels, ndarray) or labels.ndim != 2 or labels.dtype != np.uint8:
+    shaped = isinstance(labels, ndarray) and (labels.ndim == 2 or labels.shape[:-2] == (2,))
+    if not shaped or labels.dtype != np.uint8:
         kind = (
             f"shape {labels.shape} in {labels.dtype}"
             if isinstance(labels, ndarray)
             else type(labels).__name__
         )
-        raise SegmenterError(f"{who} {kind}: labels (rows, columns) in uint8 are needed")
-    (rows, columns), camera = labels.shape, frame.camera
+        raise SegmenterError(
+            f"{who} {kind}: labels (rows, columns) or (2, rows, columns) in uint8 are needed"
+        )
+    (rows, columns), camera = labels.shape[-2:], frame.camera
     off = abs(rows * camera.width - columns * camera.height)
     if min(rows, columns) < LEAST_SIDE or off > max(camera.width, camera.height):
         raise SegmenterError(

@@ -30,7 +30,7 @@ from kintrack.result import FrameResult
 from kintrack.rivals import Duel, Verdict, Vigil
 from kintrack.segmenter import Told, checked_labels, region_of
 from kintrack.sequence.frame import Frame
-from kintrack.sides import settle_sides
+from kintrack.settling import settle
 from kintrack.solver.gauss_newton import normal_equations
 from kintrack.start import Start, found_by, in_own_size
 
@@ -127,13 +127,8 @@ class Tracker(Memory):
         if self.belief is None or awaited is None:
             return self._start(frame, observation, began)
         expected = self._view(awaited, observation)
-        seen = settle_sides(
-            within(observation, box_around(expected.vertices_camera, a.region_margin_m)),
-            expected.vertices_camera,
-            expected.visible,
-            expected.labels,
-            a.side_m,
-        )
+        box = box_around(expected.vertices_camera, a.region_margin_m)
+        seen = settle(within(observation, box), expected, a.doubt_m, a.side_m)
         self._clock("observe")
         unseen = unseen_hinges(self._fitted, expected, seen, config.judge.explained_m)
         hidden = hidden_hinges(self._fitted, expected, seen, config.occlusion)

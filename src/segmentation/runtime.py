@@ -27,6 +27,10 @@ Infer = Callable[[ndarray], ndarray]
 """From a checked input (1, 4, 106, 128) to logits (7, 106, 128), both float32."""
 
 PRECISIONS = ("auto", "fp32", "bf16")
+DOUBT = 4.0
+"""A part is in doubt while another label's logit is no further below it than this."""
+FAINT_DOUBT = 6.0
+"""The same for background, which takes what is thin, far or new to a network for itself."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +111,21 @@ def labels_of(logits: Float[ndarray, "7 106 128"]) -> UInt8[ndarray, "106 128"]:
     labels = np.empty(logits.shape[1:], dtype=np.uint8)
     _largest(logits.reshape(len(LABELS), -1), labels.reshape(-1))
     return labels
+
+
+def guesses_of(logits: Float[ndarray, "7 106 128"]) -> UInt8[ndarray, "2 106 128"]:
+    """The label of the largest logit, and that of the second if it is not much less likely.
+
+    Args:
+        logits: What a network says.
+
+    Returns:
+        First and second guess; the first again where there is no doubt: where the second is less
+        likely by `DOUBT`, or by `FAINT_DOUBT` where the first is background.
+    """
+    guesses = np.empty((2, *logits.shape[1:]), dtype=np.uint8)
+    _two_largest(logits.reshape(len(LABELS), -1), guesses.reshape(2, -1), DOUBT, FAINT_DOUBT)
+    return guesses
 
 
 def probabilities_of(logits: Float[ndarray, "7 106 128"]) -> Float[ndarray, "7 106 128"]:
@@ -268,6 +287,22 @@ def _largest(logits, labels):
             if logits[label, i] > logits[best, i]:
                 best = label
         labels[i] = best
+
+
+@njit(cache=True)
+def _two_largest(logits, guesses, doubt, faint):
+    for i in range(guesses.shape[1]):
+        best = 0
+        for label in range(1, logits.shape[0]):
+            if logits[label, i] > logits[best, i]:
+                best = label
+        second = 1 if best == 0 else 0
+        for label in range(second + 1, logits.shape[0]):
+            if label != best and logits[label, i] > logits[second, i]:
+                second = label
+        near = logits[best, i] - logits[second, i] < (faint if best == 0 else doubt)
+        guesses[0, i] = best
+        guesses[1, i] = second if near else best
 
 
 RUNTIMES: dict[str, Callable[[Weights, RuntimeConfig], Infer]] = {

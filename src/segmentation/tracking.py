@@ -17,7 +17,7 @@ from segmentation.evaluate import true_labels
 from segmentation.labels import BACKGROUND, IGNORED
 from segmentation.preprocess import Letterbox, letterbox, network_input
 from segmentation.region import Window, region_of_person, window
-from segmentation.runtime import NetworkSegmenter, RuntimeConfig, labels_of, load_segmenter
+from segmentation.runtime import NetworkSegmenter, RuntimeConfig, guesses_of, load_segmenter
 from segmentation.weights import SHIPPED
 
 WIDTH_PX = 320
@@ -54,8 +54,8 @@ class ImageSegmenter:
         """How the labels are computed."""
         return f"network, {self.network.runtime}"
 
-    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
-        """Labels of the image.
+    def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "2 r c"]:
+        """First and second guess at the labels of the image.
 
         Args:
             frame: A good frame.
@@ -63,7 +63,8 @@ class ImageSegmenter:
                 lies outside of the region's window is background.
 
         Returns:
-            Labels 0 to 6 of every n-th pixel, so that at most `WIDTH_PX` columns are left.
+            Labels 0 to 6 of every n-th pixel, so that at most `WIDTH_PX` columns are left; see
+            `guesses_of`.
 
         Raises:
             InputError: if the frame has no depth or a broken one.
@@ -71,21 +72,21 @@ class ImageSegmenter:
         width, height, focal = frame.camera.width, frame.camera.height, frame.camera.fx
         view = None if region is None else window(region, width, height, focal)
         step = -(-width // WIDTH_PX)
-        out = np.zeros((-(-height // step), -(-width // step)), dtype=np.uint8)
+        out = np.zeros((2, -(-height // step), -(-width // step)), dtype=np.uint8)
         if view is None:
             whole = Window(slice(0, height), slice(0, width), letterbox(width, height))
             self._look(frame, whole, step, out)
             if not self.closer:
                 return out
             assert frame.depth_m is not None
-            found = region_of_person(out, frame.depth_m, focal)
+            found = region_of_person(out[0], frame.depth_m, focal)
             view = None if found is None else window(found, width, height, focal)
             if view is None:
                 return out
         self._look(frame, view, step, out)
         return out
 
-    def _look(self, frame: Frame, view: Window, step: int, out: UInt8[ndarray, "r c"]) -> None:
+    def _look(self, frame: Frame, view: Window, step: int, out: UInt8[ndarray, "2 r c"]) -> None:
         """Label what a window shows."""
         if frame.depth_m is None:
             raise InputError(f"frame {frame.index} has no depth: {frame.problem}")
@@ -95,11 +96,11 @@ class ImageSegmenter:
             image = network_input(frame.depth_m[part], frame.camera.fx, color, view.fit)
         except InputError as error:
             raise InputError(f"frame {frame.index}: {error}") from None
-        cells = labels_of(self.network.logits_of(image))
+        cells = guesses_of(self.network.logits_of(image))
         rows, first_row = _cells(view.rows, step, view.fit.rows, view.fit.top)
         columns, first_column = _cells(view.columns, step, view.fit.columns, view.fit.left)
-        seen = cells[rows].take(columns, axis=1)
-        out[first_row : first_row + len(rows), first_column : first_column + len(columns)] = seen
+        seen = cells[:, rows].take(columns, axis=2)
+        out[:, first_row : first_row + len(rows), first_column : first_column + len(columns)] = seen
 
 
 @dataclass(frozen=True)

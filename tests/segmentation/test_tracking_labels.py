@@ -10,6 +10,7 @@ from kintrack.segmenter import Region, checked_labels
 from kintrack.sequence.frame import Frame
 from segmentation.labels import IGNORED
 from segmentation.preprocess import HOLE
+from segmentation.runtime import DOUBT, FAINT_DOUBT, guesses_of, labels_of
 from segmentation.tracking import ImageSegmenter, TrueSegmenter
 
 
@@ -26,7 +27,7 @@ class Patches:
         D, read = image[3], image[3] < HOLE
         middle = 0.5 * (D[read].min() + D[read].max())
         labels = np.where(read, np.where(D < middle, 2, 0), 1)
-        return (np.arange(7)[:, None, None] == labels).astype(np.float32)
+        return 9.0 * (np.arange(7)[:, None, None] == labels).astype(np.float32)
 
 
 def frame(width, height, labels=None):
@@ -46,25 +47,26 @@ def person(width, height):
 @pytest.mark.parametrize("closer", [False, True])
 def test_labels_cover_the_image_without_the_pictures_bars(size, closer):
     shown = person(*size)
-    labels = checked_labels(ImageSegmenter(Patches(), closer), shown)
+    labels, second = checked_labels(ImageSegmenter(Patches(), closer), shown)
+    assert np.array_equal(second, labels)
     right = labels_of_pixels(labels, shown.depth_m) == np.where(shown.depth_m < 3, 2, 0)
     assert right.mean() > 0.97 and 1 not in labels
 
 
 def test_the_second_look_is_a_closer_one_and_sharper():
     network, shown = Patches(), replace(person(512, 424))
-    labels = checked_labels(ImageSegmenter(network), shown)
+    labels, _ = checked_labels(ImageSegmenter(network), shown)
     whole, closer = network.seen
     assert closer[3].min() < whole[3].min() - 0.3
     off = labels_of_pixels(labels, shown.depth_m) != np.where(shown.depth_m < 3, 2, 0)
-    once = labels_of_pixels(ImageSegmenter(Patches(), False).segment(shown), shown.depth_m)
+    once = labels_of_pixels(ImageSegmenter(Patches(), False).segment(shown)[0], shown.depth_m)
     assert off.sum() < (once != np.where(shown.depth_m < 3, 2, 0)).sum()
 
 
 def test_a_known_region_takes_one_look_and_is_blind_to_all_else():
     network, shown = Patches(), person(512, 424)
     shown.depth_m[:, -20:] = 2.0
-    labels = checked_labels(ImageSegmenter(network), shown, Region((192.0, 212.0), 2.0))
+    labels, _ = checked_labels(ImageSegmenter(network), shown, Region((192.0, 212.0), 2.0))
     assert len(network.seen) == 1
     assert labels[106, 96] == 2 and not labels[:, -10:].any()
 
@@ -86,3 +88,15 @@ def test_true_labels_come_at_the_networks_size_without_ignored_cells(size):
 
 def test_a_frame_without_true_labels_shows_nobody():
     assert not checked_labels(TrueSegmenter(), frame(320, 240)).any()
+
+
+def test_where_a_network_wavers_it_names_both_labels():
+    logits = np.zeros((7, 1, 4), dtype=np.float32)
+    logits[:, 0] = -20.0
+    logits[[2, 3], 0, 0] = 5.0, 5.0 - 0.9 * DOUBT
+    logits[[2, 3], 0, 1] = 5.0, 5.0 - 1.1 * DOUBT
+    logits[[0, 4], 0, 2] = 5.0, 5.0 - 0.9 * FAINT_DOUBT
+    logits[[0, 4], 0, 3] = 5.0, 5.0 - 1.1 * FAINT_DOUBT
+    first, second = guesses_of(logits)
+    assert first[0].tolist() == [2, 2, 0, 0] and second[0].tolist() == [3, 2, 4, 0]
+    assert np.array_equal(first, labels_of(logits))

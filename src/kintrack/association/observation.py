@@ -29,13 +29,16 @@ class Observation:
     """True if an empty pixel is the sensor's failure, not free space."""
     labels: UInt8[ndarray, "h w"] | None = None
     """Body part of every pixel, 0 = not the person or no reading; None without a segmenter."""
+    second: UInt8[ndarray, "h w"] | None = None
+    """What else a pixel's label might be, the same as it first was where that is beyond doubt; None
+    if that is not known."""
 
 
 def observe(
     frame: Frame,
     max_width_px: int,
     background_share: float = 0.5,
-    labels: UInt8[ndarray, "r c"] | None = None,
+    labels: UInt8[ndarray, "*guess r c"] | None = None,
 ) -> Observation:
     """Back-project a frame, thinned to at most `max_width_px` columns.
 
@@ -43,7 +46,8 @@ def observe(
         frame: A good frame.
         max_width_px: Largest working width [px].
         background_share: Share of pixels with a reading from which a background is assumed.
-        labels: Label map that covers the whole image, in any size; None if there is none.
+        labels: Label map that covers the whole image, in any size, or two of them, see `Segmenter`;
+            None if there is none.
 
     Returns:
         The observation; its region is every pixel with a reading, or, where there are labels,
@@ -58,10 +62,11 @@ def observe(
     has_background = bool(read.mean() >= background_share)
     if labels is None:
         return Observation(camera, points, read, has_background)
-    part = labels_of_pixels(labels, points[..., 2])
+    guesses = labels.reshape(-1, *labels.shape[-2:])
+    part, *others = [labels_of_pixels(guess, points[..., 2]) for guess in guesses]
     if not has_background:
         part = spread_labels(part, points[..., 2])
-    return Observation(camera, points, part > 0, has_background, part)
+    return Observation(camera, points, part > 0, has_background, part, *others)
 
 
 def within(observation: Observation, box_camera: Float[ndarray, "2 3"]) -> Observation:

@@ -23,7 +23,7 @@ from kintrack.judge import agreement
 from kintrack.labelled_config import LabelledStartConfig
 from kintrack.people import choose, find_people, only
 from kintrack.residuals.prior import diagonal_prior
-from kintrack.sides import settle_sides
+from kintrack.settling import settle
 from kintrack.start.begun import Start
 from kintrack.start.evidence import evidence_of
 from kintrack.start.placing import guesses, view_mismatch
@@ -76,7 +76,7 @@ def start_at(
     gates = np.geomspace(start.gate_m, last, start.rounds).tolist()
 
     def settled(view: View) -> Observation:
-        return settle_sides(seen, view.vertices_camera, view.visible, view.labels, start.side_m)
+        return settle(seen, view, config.association.doubt_m, start.side_m)
 
     def fitted(q: ndarray, gates: list[float]) -> tuple[float, Fit, View] | None:
         sigma = prior_sigma(human.body, config.prior)

@@ -72,7 +72,7 @@ class Sample:
         bare = modality in (DEPTH, DEPTH_ONCE)
         if modality in (RGBD, DEPTH):
             frame = replace(self.frame, color=None) if bare else self.frame
-            return labels_to_network(ImageSegmenter(network).segment(frame))
+            return labels_to_network(ImageSegmenter(network).segment(frame)[0])
         image = self.image
         if bare:
             image = image.copy()
