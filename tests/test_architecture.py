@@ -28,6 +28,7 @@ ROWS = (
     ("belief", "confidence"),
     ("solver",),
     ("alignment",),
+    ("settling",),
     ("occlusion", "judge"),
     ("start",),
     ("begin",),
