@@ -64,6 +64,7 @@ HEAVY = {
     "segmentation/loss.py": {"torch"},
     "segmentation/calibrate.py": {"torch"},
     "segmentation/learner.py": {"torch"},
+    "segmentation/muon.py": {"torch"},
     "segmentation/train.py": {"torch"},
     "segmentation/runtime.py": {"torch", "openvino"},
     "segmentation/graph.py": {"openvino"},

@@ -17,6 +17,7 @@ from torch import Tensor, nn
 from segmentation.errors import SegmentationError, WeightsError
 from segmentation.evaluate import N, confusion
 from segmentation.loss import segmentation_loss
+from segmentation.muon import Muon
 from segmentation.networks import PartNetwork, tensors_of, unfold
 from segmentation.training_config import TrainConfig
 from segmentation.weights import Weights
@@ -86,12 +87,8 @@ class Learner:
         for network in (self.network, self.average):
             network.to(group.device).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average.requires_grad_(False).eval()
-        kinds = {"adamw": torch.optim.AdamW, "adam": torch.optim.Adam}
-        decay = config.weight_decay if config.optimiser == "adamw" else 0.0
-        self.optimiser = kinds[config.optimiser](
-            self.network.parameters(), lr=config.rate, weight_decay=decay
-        )
         self.bf16 = _takes_bf16(config, group.device)
+        self.optimiser = _optimiser(config, self.network, self.bf16)
         self._forward: nn.Module = self.network
         if group.world > 1:
             from torch.nn.parallel import DistributedDataParallel
@@ -177,6 +174,17 @@ def check_finite(loss: float, step: int) -> None:
 def _floats(network: PartNetwork) -> list[Tensor]:
     """Weights and running statistics."""
     return [t for t in network.state_dict(keep_vars=True).values() if t.is_floating_point()]
+
+
+def _optimiser(config: TrainConfig, network: PartNetwork, bf16: bool) -> torch.optim.Optimizer:
+    if config.optimiser == "adam":
+        return torch.optim.Adam(network.parameters(), config.rate)
+    if config.optimiser == "adamw":
+        return torch.optim.AdamW(
+            network.parameters(), config.rate, weight_decay=config.weight_decay
+        )
+    dtype = torch.bfloat16 if bf16 else torch.float32
+    return Muon(network.parameters(), config.rate, config.weight_decay, dtype=dtype)
 
 
 def _takes_bf16(config: TrainConfig, device: torch.device) -> bool:

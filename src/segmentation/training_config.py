@@ -15,7 +15,7 @@ from segmentation.errors import SegmentationError
 
 PRECISIONS = ("auto", "fp32", "bf16")
 DEVICES = ("auto", "cpu", "cuda")
-OPTIMISERS = ("adamw", "adam")
+OPTIMISERS = ("muon", "adamw", "adam")
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class TrainConfig:
     """Learning rate at the end, share of the highest."""
     warmup_steps: int = 200
     """Steps in which the learning rate rises; at most a tenth of `steps`."""
-    optimiser: str = "adamw"
-    """adamw or adam."""
+    optimiser: str = "muon"
+    """muon, adamw or adam."""
     weight_decay: float = 1e-4
     """Decay of weights, times the learning rate, per step."""
     clip: float = 1.0

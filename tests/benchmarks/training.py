@@ -33,6 +33,8 @@ from segmentation.weights import load_weights
 FOLDER = OUT / "training"
 PAPER_FRAMES, PAPER_PARTS = 120, ("paper/train", "paper/objects")
 FULL_FRAMES, QUICK_FRAMES = 12_000, 60
+BANK = ("--bank.cutouts", "3000", "--bank.rooms", "600")
+"""Things and rooms to put into pictures, as many as for what ships."""
 SHIPPED = "fast_fcn"
 WIDTHS = {
     "fast_fcn": "32 64 192 512",
@@ -72,8 +74,9 @@ def main() -> int:
     arguments = _arguments()
     folder = FOLDER.with_name("training_quick") if arguments.quick else FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    frames = QUICK_FRAMES if arguments.quick else arguments.frames
-    _build(folder, arguments.data, frames, arguments.quick)
+    if not arguments.sets:
+        frames = QUICK_FRAMES if arguments.quick else arguments.frames
+        _build(folder, arguments.data, frames, arguments.quick)
     shared = ["--batch", str(arguments.batch), "--seed", str(arguments.seed)]
     if arguments.what == "ship":
         length = ["--steps", "4"] if arguments.quick else ["--hours", str(arguments.hours)]
@@ -102,6 +105,7 @@ def _arguments() -> argparse.Namespace:
     made.add_argument("what", choices=("ship", "compare"))
     made.add_argument("--data", type=Path, default=DATA, help="folder with mocap/")
     made.add_argument("--frames", type=int, default=FULL_FRAMES, help="of the recipe `training`")
+    made.add_argument("--sets", nargs="+", help="train on datasets made before, below out/training")
     made.add_argument("--hours", type=float, default=2.5, help="length of `ship`")
     made.add_argument("--steps", type=int, default=20_000, help="length of each of `compare`")
     made.add_argument("--batch", type=int, default=16)
@@ -133,14 +137,14 @@ def _train(
     """Weights of a run, which goes on where it was stopped."""
     path = folder / recipe.name / WEIGHTS_FILE
     widths = (QUICK_WIDTHS if arguments.quick else WIDTHS)[recipe.architecture]
-    parts = () if arguments.quick else PAPER_PARTS
+    sets = arguments.sets or ("training", *(() if arguments.quick else PAPER_PARTS))
     if not path.is_file():
-        less = ["--bank.cutouts", "4", "--bank.rooms", "2"] if arguments.quick else []
+        bank = ("--bank.cutouts", "4", "--bank.rooms", "2") if arguments.quick else BANK
         threads = [] if arguments.processes == 1 else ["--threads", "1"]
         _kintrack(
-            folder, "train", "training", *parts, "-o", recipe.name, "--cache", "cache",
+            folder, "train", *sets, "-o", recipe.name, "--cache", "cache",
             "--network.architecture", recipe.architecture, "--network.widths", *widths.split(),
-            *options, *recipe.options, *less, *threads, processes=arguments.processes,
+            *options, *recipe.options, *bank, *threads, processes=arguments.processes,
         )  # fmt: skip
     return path
 

@@ -215,7 +215,7 @@ def test_a_loss_that_is_no_number_is_named():
 @pytest.mark.parametrize(
     ("values", "words"),
     [({"device": "tpu"}, "device = 'tpu': auto, cpu, cuda"), ({"precision": "int4"}, "int4"),
-     ({"optimiser": "sgd"}, "adamw, adam")],
+     ({"optimiser": "sgd"}, "muon, adamw, adam")],
 )  # fmt: skip
 def test_an_option_that_is_none_is_named(values, words):
     with pytest.raises(SegmentationError, match=words):
