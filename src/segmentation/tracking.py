@@ -16,7 +16,7 @@ from segmentation.errors import InputError
 from segmentation.evaluate import true_labels
 from segmentation.labels import BACKGROUND, IGNORED
 from segmentation.preprocess import Letterbox, letterbox, network_input
-from segmentation.region import Window, region_of_person, window
+from segmentation.region import Window, cells_per_pixel, region_of_person, window
 from segmentation.runtime import NetworkSegmenter, RuntimeConfig, guesses_of, load_segmenter
 from segmentation.weights import SHIPPED
 
@@ -60,7 +60,8 @@ class ImageSegmenter:
         Args:
             frame: A good frame.
             region: Where the person is, if that is known: then the first look is saved, and what
-                lies outside of the region's window is background.
+                lies outside of the region's window is background. Whoever is so near that her
+                window is no closer than the image gets one look at the image.
 
         Returns:
             Labels 0 to 6 of every n-th pixel, so that at most `WIDTH_PX` columns are left; see
@@ -69,8 +70,8 @@ class ImageSegmenter:
         Raises:
             InputError: if the frame has no depth or a broken one.
         """
-        width, height, focal = frame.camera.width, frame.camera.height, frame.camera.fx
-        view = None if region is None else window(region, width, height, focal)
+        width, height = frame.camera.width, frame.camera.height
+        view = _closer(region, frame)
         step = -(-width // WIDTH_PX)
         out = np.zeros((2, -(-height // step), -(-width // step)), dtype=np.uint8)
         if view is None:
@@ -79,8 +80,8 @@ class ImageSegmenter:
             if not self.closer:
                 return out
             assert frame.depth_m is not None
-            found = region_of_person(out[0], frame.depth_m, focal)
-            view = None if found is None else window(found, width, height, focal)
+            found = region_of_person(out[0], frame.depth_m, frame.camera.fx)
+            view = _closer(found, frame)
             if view is None:
                 return out
         self._look(frame, view, step, out)
@@ -125,6 +126,17 @@ class TrueSegmenter:
 def inside_bars(labels: UInt8[ndarray, "106 128"], fit: Letterbox) -> UInt8[ndarray, "r c"]:
     """The part of the network's picture that the image fills."""
     return labels[fit.top : fit.top + fit.rows, fit.left : fit.left + fit.columns]
+
+
+def _closer(region: Region | None, frame: Frame) -> Window | None:
+    """The window of a region; None if there is none or if the whole image shows her as large."""
+    if region is None:
+        return None
+    camera = frame.camera
+    whole = letterbox(camera.width, camera.height).columns / camera.width
+    if cells_per_pixel(region.depth_m, camera.fx) <= whole:
+        return None
+    return window(region, camera.width, camera.height, camera.fx)
 
 
 def _cells(span: slice, step: int, count: int, first: int) -> tuple[ndarray, int]:

@@ -71,6 +71,14 @@ def test_a_known_region_takes_one_look_and_is_blind_to_all_else():
     assert labels[106, 96] == 2 and not labels[:, -10:].any()
 
 
+def test_somebody_whom_the_image_shows_larger_than_a_window_would_gets_one_look():
+    network, shown = Patches(), person(512, 424)
+    shown.depth_m[shown.depth_m < 3.0] = 1.0
+    first, _ = checked_labels(ImageSegmenter(network), shown)
+    known, _ = checked_labels(ImageSegmenter(network), shown, Region((192.0, 212.0), 1.0))
+    assert len(network.seen) == 2 and np.array_equal(known, first)
+
+
 def test_a_region_off_the_image_is_as_good_as_none():
     network = Patches()
     checked_labels(ImageSegmenter(network), person(512, 424), Region((5000.0, 0.0), 2.0))
