@@ -6,9 +6,9 @@ Data are made, networks trained one after the other in out/training/; a stopped 
     python tests/benchmarks/training.py ship
     python tests/benchmarks/training.py compare --steps 20000 --processes 2
 
-`compare` trains Fast-FCN, U-Net and VGG-FCN, Fast-FCN without inserted objects, and Fast-FCN with
-other weights of the background modifier, all on the same data and for as many steps, and writes
-docs/results.md. What validates are people whom training does not see.
+`compare` trains Fast-FCN, U-Net and VGG-FCN, Fast-FCN without inserted objects, with AdamW in the
+place of Muon, and with other weights of the background modifier, all on the same data and for as
+many steps, and writes docs/results.md. What validates are people whom training does not see.
 """
 
 from __future__ import annotations
@@ -64,6 +64,7 @@ COMPARED = (
     Recipe("unet", "unet"),
     Recipe("vgg_fcn", "vgg_fcn"),
     Recipe("without_objects", "fast_fcn", ("--augment.inserted", "0")),
+    Recipe("adamw", "fast_fcn", ("--optimiser", "adamw")),
     *(Recipe(f"lambda_{weight:g}", "fast_fcn", ("--background-weight", f"{weight:g}"))
       for weight in LAMBDAS),
 )  # fmt: skip
@@ -88,7 +89,8 @@ def main() -> int:
         recipe.name: _train(folder, recipe, [*shared, "--steps", str(steps)], arguments)
         for recipe in COMPARED
     }
-    pairs = " ".join(f"{name}={path}" for name, path in files.items() if "lambda" not in name)
+    tables = [recipe.name for recipe in COMPARED[:4]]
+    pairs = " ".join(f"{name}={files[name]}" for name in tables)
     print(f"the tables: python tests/benchmarks/part_segmentation.py --weights {pairs}")
     if not arguments.quick:
         figure = _figure({name: path.with_name(LOG_FILE) for name, path in files.items()})
