@@ -102,7 +102,7 @@ def test_a_guess_is_the_body_that_its_postures_drew(human):
 def test_the_best_guess_is_near_before_anything_is_fitted(human, scene):
     q = scene.place(None, 90.0)
     evidence = evidence_of(labelled(scene, q), T)
-    found = guesses(postures_of(human), evidence, 12, 0.05, len(human.skin.labels))
+    found = guesses(postures_of(human), evidence, 12, 0.05, len(human.skin.labels), 12)
     costs = [guess.mismatch_m2 + guess.unrest_m2 for guess in found]
     assert costs == sorted(costs)
     guess = world_joints(scene, found[0].q)

@@ -141,8 +141,8 @@ class LabelledStartConfig:
     """What parts people."""
     headings: int = 12
     """Headings tried, evenly over the circle."""
-    fitted: int = 5
-    """The best so many guesses are fitted."""
+    fitted: int = 12
+    """The best so many guesses are fitted: whoever is seen from the side may have the last one."""
     gate_m: float = 0.25
     """Largest distance in the first rounds of a fit [m]."""
     rounds: int = 5
@@ -158,7 +158,7 @@ class LabelledStartConfig:
         check_bounds(
             self,
             headings=(4, 72),
-            fitted=(1, 20),
+            fitted=(1, 100),
             gate_m=(0.02, 2),
             rounds=(1, 100),
             last_rounds=(1, 100),

@@ -2,7 +2,7 @@
 """A start from part labels: any place, any heading, any posture, and not all of the person.
 
 Every heading and several trunks are put onto the labelled points with the limbs that suit them best
-(`placing`). The few best are fitted like any frame, only from further away, and the one whose skin
+(`placing`). The best are fitted like any frame, only from further away, and the one whose skin
 and labels agree best with what is seen is kept.
 """
 
@@ -68,8 +68,9 @@ def start_at(
 ) -> Start | None:
     """Fit the body to one person's labelled points, see `start_from_labels`."""
     evidence = evidence_of(seen, T_world_camera)
+    vertices = len(human.skin.labels)
     tries = guesses(
-        postures_of(human), evidence, start.headings, start.side_m, len(human.skin.labels)
+        postures_of(human), evidence, start.headings, start.side_m, vertices, start.fitted
     )
     T_camera_world = invert_rigid(T_world_camera)
     last = config.association.last_gate_m
@@ -91,7 +92,7 @@ def start_at(
         return view_mismatch(view, evidence, start.side_m), fit, view
 
     best, least = None, np.inf
-    for guess in tries[: start.fitted]:
+    for guess in tries:
         found = fitted(guess.q, gates)
         if found is not None and found[0] + guess.unrest_m2 < least:
             best, least = found, found[0] + guess.unrest_m2

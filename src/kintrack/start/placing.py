@@ -20,8 +20,6 @@ from kintrack.start.cost import mismatch, place
 from kintrack.start.evidence import Evidence
 from kintrack.start.postures import STRIDE, TORSO_STRIDE, Postures, root_rotation
 
-KEPT = 12
-"""So many tries get a second choice of limbs."""
 SKIN_M2 = 1.8
 """An adult's skin [m^2]."""
 VIEW_STRIDE = 2
@@ -49,7 +47,7 @@ class _Try(NamedTuple):
 
 
 def guesses(
-    postures: Postures, evidence: Evidence, headings: int, side_m: float, vertices: int
+    postures: Postures, evidence: Evidence, headings: int, side_m: float, vertices: int, kept: int
 ) -> list[Guess]:
     """Every heading with every trunk, put where the evidence is.
 
@@ -59,9 +57,10 @@ def guesses(
         headings: Yaws tried, evenly over the circle.
         side_m: How far a limb's side is believed [m].
         vertices: Of the whole tracking skin.
+        kept: So many of the best tries get a second choice of limbs.
 
     Returns:
-        The `KEPT` best guesses, the best first; none without a point.
+        The `kept` best guesses, the best first; none without a point.
     """
     if len(evidence.points_world) == 0:
         return []
@@ -101,7 +100,7 @@ def guesses(
         for trunk in range(len(skins))
         for n in range(headings)
     ]
-    best = sorted(tries, key=lambda one: one.cost)[:KEPT]
+    best = sorted(tries, key=lambda one: one.cost)[:kept]
     again = [attempt(one.trunk, one.yaw_rad, one.t, one.choice, 2) for one in best]
     found = []
     for one in sorted(again, key=lambda one: one.cost):
