@@ -36,9 +36,9 @@ def test_steps_are_those_of_torch_and_of_adamw():
         for optimiser in (both, muon, adamw):
             optimiser.step()
     torch.testing.assert_close(ours[1], vector)
-    # Rounding to bfloat16 in another order is all that may differ.
+    # Rounding to bfloat16 in another order is all that may differ; it makes 0.018, 5 % of the step 0.042.
     moved, beside = matrix - weight.flatten(1), ours[0].flatten(1) - matrix
-    assert beside.norm() < 0.03 * moved.norm()
+    assert beside.norm() < 0.025 * moved.norm()
 
 
 def test_layers_of_few_channels_are_left_to_adamw():
