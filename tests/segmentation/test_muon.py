@@ -36,7 +36,7 @@ def test_steps_are_those_of_torch_and_of_adamw():
         for optimiser in (both, muon, adamw):
             optimiser.step()
     torch.testing.assert_close(ours[1], vector)
-    # Rounding to bfloat16 in another order is all that may differ; it makes 0.018, 5 % of the step 0.042.
+    # Rounding to bfloat16 in another order is all that may differ: 0.018 (0.042 with RMS 0.21).
     moved, beside = matrix - weight.flatten(1), ours[0].flatten(1) - matrix
     assert beside.norm() < 0.025 * moved.norm()
 
