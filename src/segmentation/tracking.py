@@ -24,6 +24,11 @@ WIDTH_PX = 320
 """Labels of an image come thinned to at most so many columns."""
 
 
+def thinning(width: int) -> int:
+    """n, where labels of an image of this width come for every n-th pixel."""
+    return -(-width // WIDTH_PX)
+
+
 def image_segmenter(
     weights: Path | None = None, config: RuntimeConfig | None = None
 ) -> ImageSegmenter:
@@ -72,7 +77,7 @@ class ImageSegmenter:
         """
         width, height = frame.camera.width, frame.camera.height
         view = _closer(region, frame)
-        step = -(-width // WIDTH_PX)
+        step = thinning(width)
         out = np.zeros((2, -(-height // step), -(-width // step)), dtype=np.uint8)
         if view is None:
             whole = Window(slice(0, height), slice(0, width), letterbox(width, height))

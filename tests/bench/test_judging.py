@@ -15,6 +15,7 @@ from kintrack.bench.segmentation.samples import (
 )
 from kintrack.bench.segmentation.summary import Judged, summary
 from kintrack.errors import DatasetError
+from segmentation.labels import IGNORED
 from segmentation.preprocess import labels_to_network
 
 from .small_bench import figure, oracle, record, witnessed
@@ -59,6 +60,21 @@ def test_true_labels_score_full_marks_with_and_without_colour(recording, tmp_pat
     whole, closer, once, bare = network.segmenter.images[:4]
     assert np.array_equal(whole, once) and not np.array_equal(whole[3], closer[3])
     assert whole[:3].any() and not bare[:3].any() and np.array_equal(whole[3], bare[3])
+
+
+def test_cells_of_a_closer_look_lie_askew_to_those_that_judge_it(recording, tmp_path):
+    one = scores(recording, judged(recording, oracle(), tmp_path), RGBD)
+    assert 0.94 < one["non_background_iou"] < one["of_pixels"]["non_background_iou"] <= 1.0
+
+
+def test_pixels_without_a_reading_are_of_no_use_to_a_tracker_and_not_judged_there(tmp_path):
+    case = case_of(record(tmp_path / "bare", removed=True))
+    read = [sample.frame.depth_m > 0 for sample in samples(case)]
+    assert not np.all(read)
+    (sample,) = samples(case, [0])
+    assert np.array_equal(sample.truth_of_pixels != IGNORED, read[0])
+    counts = judged(case, oracle(), tmp_path)["oracle", RGBD]["counts_of_pixels"]
+    assert np.sum(counts) == np.sum(read)
 
 
 def test_swapped_arms_cost_the_arms_and_nothing_else(recording, tmp_path):

@@ -97,7 +97,7 @@ def section(content: dict[str, Any]) -> str:
 
 {_grid(tables.aims(content))}
 
-Labels are judged at the network's size, 128 x 106; a pixel without a reading is background in the
+Unless a table says otherwise, labels are judged at the network's size, 128 x 106; a pixel without a reading is background in the
 truth, as the networks are taught. Non-background IoU: pixels with the right part, over those that
 are person in truth or by label. Unless a row says otherwise the labels come from the runtime that a
 user gets ({_used(content)}).
@@ -123,6 +123,12 @@ hides a third of the person; its farthest point lies 30, 45 or 60 cm before her 
 {_grid(tables.accuracy(content))}
 
 {_grid(tables.parts(content))}
+
+Labels of a second look have cells of their own, which lie askew to those of the whole image: judged
+at the network's size, parts a few cells wide lose by that alone. A tracker uses the labels of the
+depth image's pixels (every other one of 512 x 424); judged there:
+
+{_grid(tables.of_pixels(content))}
 
 ### Real recordings
 

@@ -6,9 +6,9 @@ Data are made, networks trained one after the other in out/training/; a stopped 
     python tests/benchmarks/training.py ship
     python tests/benchmarks/training.py compare --steps 20000 --processes 2
 
-`compare` trains Fast-FCN, U-Net and VGG-FCN, Fast-FCN without inserted objects, with AdamW in the
-place of Muon, and with other weights of the background modifier, all on the same data and for as
-many steps, and writes docs/results.md. What validates are people whom training does not see.
+`compare` trains Fast-FCN, U-Net and VGG-FCN, Fast-FCN without inserted objects, and with other
+weights of the background modifier, all on the same data and for as many steps, and writes
+docs/results.md. What validates are people whom training does not see.
 """
 
 from __future__ import annotations
@@ -64,7 +64,6 @@ COMPARED = (
     Recipe("unet", "unet"),
     Recipe("vgg_fcn", "vgg_fcn"),
     Recipe("without_objects", "fast_fcn", ("--augment.inserted", "0")),
-    Recipe("adamw", "fast_fcn", ("--optimiser", "adamw")),
     *(Recipe(f"lambda_{weight:g}", "fast_fcn", ("--background-weight", f"{weight:g}"))
       for weight in LAMBDAS),
 )  # fmt: skip

@@ -7,7 +7,15 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from kintrack.bench.segmentation.tables import Grid, accuracy, aims, composites, mask, witness
+from kintrack.bench.segmentation.tables import (
+    Grid,
+    accuracy,
+    aims,
+    composites,
+    mask,
+    of_pixels,
+    witness,
+)
 from segmentation.preprocess import SPECIFICATION
 
 HEAD = """# Model card: the part segmentation that ships
@@ -45,7 +53,7 @@ def card(content: Mapping[str, Any], curves: str | None) -> str:
     training = facts["training"]
     own = whole | {"labels": _only(whole["labels"], name), "mask": _only(whole["mask"], name),
                    "witness": _only(whole["witness"], name)}  # fmt: skip
-    grids = [aims(whole), accuracy(own)]
+    grids = [aims(whole), accuracy(own), of_pixels(own)]
     grids += [grid for grid in (composites(own), mask(own)) if grid.rows]
     if own["witness"]:
         grids.append(witness(own))

@@ -173,7 +173,7 @@ def _draw_joints(axes: Sequence[Axes], sample: Sample, labels: UInt8[ndarray, "1
 
 
 def _labels(network: Network, sample: Sample, modality: str) -> UInt8[ndarray, "106 128"]:
-    return sample.labels_by(network.segmenter, modality)
+    return sample.labels_by(network.segmenter, modality).cells
 
 
 def _show(axis: Axes, picture: ndarray, title: str) -> None:

@@ -15,7 +15,14 @@ from numpy import ndarray
 
 from kintrack.bench.segmentation.cases import Case
 from kintrack.bench.segmentation.networks import Network
-from kintrack.bench.segmentation.samples import DEPTH, DEPTH_ONCE, MODALITIES, Sample, samples
+from kintrack.bench.segmentation.samples import (
+    DEPTH,
+    DEPTH_ONCE,
+    MODALITIES,
+    Labelled,
+    Sample,
+    samples,
+)
 from kintrack.bench.segmentation.witness import JointCounts
 from kintrack.errors import DatasetError
 from kintrack.files import write_json
@@ -34,6 +41,8 @@ class Tally:
     """Pixels by true label and label."""
     counts_strict: ndarray = field(default_factory=lambda: np.zeros((N, N), np.int64))
     """The same, readings of unknown meaning taken for background."""
+    counts_of_pixels: ndarray = field(default_factory=lambda: np.zeros((N, N), np.int64))
+    """Pixels of the image with a reading, by true label and label."""
     mask: ndarray = field(default_factory=lambda: np.zeros((2, 2), np.int64))
     """Pixels by person in truth and by label."""
     mask_read: ndarray = field(default_factory=lambda: np.zeros((2, 2), np.int64))
@@ -44,8 +53,9 @@ class Tally:
     """Number of a frame and how good it is, 0 to 1: intersection over union of the parts or the
     mask, or else the share of joints on their own part; NaN where there are too few."""
 
-    def add(self, sample: Sample, labels: UInt8[ndarray, "106 128"]) -> None:
+    def add(self, sample: Sample, labelled: Labelled) -> None:
         """Count a frame."""
+        labels = labelled.cells
         score = float("nan")
         if sample.joints:
             right, seen = self.joints.add(labels, sample.read, sample.joints, sample.size)
@@ -55,6 +65,8 @@ class Tally:
             self.counts += own
             self.counts_strict += confusion(_as_background(sample), labels)
             score = scores_of(own).non_background_iou
+        if sample.truth_of_pixels is not None:
+            self.counts_of_pixels += confusion(sample.truth_of_pixels, labelled.pixels)
         if sample.mask is not None:
             own = _pairs(sample.mask, labels)
             self.mask += own
@@ -67,6 +79,7 @@ class Tally:
         return {
             "counts": self.counts.tolist(),
             "counts_strict": self.counts_strict.tolist(),
+            "counts_of_pixels": self.counts_of_pixels.tolist(),
             "mask": self.mask.tolist(),
             "mask_read": self.mask_read.tolist(),
             "joints": self.joints.plain(),
@@ -122,8 +135,8 @@ def judge(
     frames = 0
     for sample in samples(case):
         for network, modality, _, _ in missing:
-            labels = sample.labels_by(network.segmenter, modality)
-            tallies[network.name, modality].add(sample, labels)
+            labelled = sample.labels_by(network.segmenter, modality)
+            tallies[network.name, modality].add(sample, labelled)
         frames += 1
         on_frame()
     if not frames:

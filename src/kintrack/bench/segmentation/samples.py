@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -22,9 +23,9 @@ from kintrack.sequence.reference import read_reference_pixels
 from segmentation.errors import InputError
 from segmentation.evaluate import true_labels
 from segmentation.labels import BACKGROUND, IGNORED
-from segmentation.preprocess import HOLE, frame_input, labels_to_network
+from segmentation.preprocess import HOLE, frame_input, labels_to_image, labels_to_network
 from segmentation.runtime import NetworkSegmenter, labels_of
-from segmentation.tracking import ImageSegmenter
+from segmentation.tracking import ImageSegmenter, thinning
 
 RGBD, DEPTH = "RGB-D", "depth only"
 """What a network is shown; the whole image first, then the person."""
@@ -33,6 +34,15 @@ RGBD_ONCE, DEPTH_ONCE = "RGB-D, one look", "depth only, one look"
 MODALITIES = (RGBD, RGBD_ONCE, DEPTH, DEPTH_ONCE)
 ROUNDING_M = 0.0015
 """Readings that differ less are the same, written twice [m]."""
+
+
+class Labelled(NamedTuple):
+    """What a network says of a frame."""
+
+    cells: UInt8[ndarray, "106 128"]
+    """At the network's size; bars have any label."""
+    pixels: UInt8[ndarray, "r c"]
+    """Of every n-th pixel of the image, as a tracker gets them."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +57,8 @@ class Sample:
     """The frame itself."""
     truth: UInt8[ndarray, "106 128"] | None = None
     """True labels."""
+    truth_of_pixels: UInt8[ndarray, "r c"] | None = None
+    """The same of every n-th pixel of the image, `IGNORED` where it has no reading."""
     mask: UInt8[ndarray, "106 128"] | None = None
     """1 for the person, 0 for all else, `IGNORED` in the bars."""
     joints: dict[str, Float[ndarray, " 2"]] = field(default_factory=dict)
@@ -67,17 +79,20 @@ class Sample:
         """Width and height of the frame [px]."""
         return self.frame.camera.width, self.frame.camera.height
 
-    def labels_by(self, network: NetworkSegmenter, modality: str) -> UInt8[ndarray, "106 128"]:
-        """What a network says, at its size; bars have any label."""
+    def labels_by(self, network: NetworkSegmenter, modality: str) -> Labelled:
+        """What a network says when it is shown one of `MODALITIES`."""
         bare = modality in (DEPTH, DEPTH_ONCE)
         if modality in (RGBD, DEPTH):
             frame = replace(self.frame, color=None) if bare else self.frame
-            return labels_to_network(ImageSegmenter(network).segment(frame)[0])
+            pixels = ImageSegmenter(network).segment(frame)[0]
+            return Labelled(labels_to_network(pixels), pixels)
         image = self.image
         if bare:
             image = image.copy()
             image[:3] = 0.0
-        return labels_of(network.logits_of(image))
+        cells = labels_of(network.logits_of(image))
+        step = thinning(self.size[0])
+        return Labelled(cells, labels_to_image(cells, *self.size)[::step, ::step])
 
 
 def samples(case: Case, numbers: Sequence[int] | None = None) -> Iterator[Sample]:
@@ -106,7 +121,8 @@ def _sample(
     if frame.depth_m is None:
         return None
     try:
-        truth = _truth(frame, bare.frame(number) if bare is not None else None)
+        known = _known(frame, bare.frame(number) if bare is not None else None)
+        truth = None if known is None else true_labels(known)
         image = frame_input(frame)
         mask = _mask(case.sequence / MASK_FOLDER / f"{number:06d}.png")
     except InputError as error:
@@ -114,20 +130,32 @@ def _sample(
     seen = joints[number] if number < len(joints) else {}
     if truth is None and mask is None and not seen:
         return None
-    return Sample(number, image, frame, truth, mask, seen)
+    return Sample(number, image, frame, truth, _of_pixels(known), mask, seen)
 
 
-def _truth(frame: Frame, bare: Frame | None) -> UInt8[ndarray, "106 128"] | None:
-    """True labels; `IGNORED` where the bare person has a reading that nobody labelled."""
+def _of_pixels(known: Frame | None) -> UInt8[ndarray, "r c"] | None:
+    """True labels of the pixels that a tracker gets labels of."""
+    if known is None or known.labels is None or known.depth_m is None:
+        return None
+    step = thinning(known.camera.width)
+    labels, depth_m = known.labels[::step, ::step], known.depth_m[::step, ::step]
+    return np.where(depth_m > 0, labels, np.uint8(IGNORED))
+
+
+def _known(frame: Frame, bare: Frame | None) -> Frame | None:
+    """The frame with `IGNORED` where the bare person has a reading that nobody labelled.
+
+    None if the frame has no labels.
+    """
     if frame.labels is None:
         return None
     if bare is None or bare.depth_m is None or bare.labels is None:
-        return true_labels(frame)
+        return frame
     assert frame.depth_m is not None
     own = (bare.depth_m > 0) & (np.abs(frame.depth_m - bare.depth_m) < ROUNDING_M)
     unknown = own & (bare.labels == BACKGROUND)
     marked = np.where(unknown, np.uint8(IGNORED), frame.labels)
-    return true_labels(Frame(frame.index, 0.0, frame.camera, frame.depth_m, labels=marked))
+    return Frame(frame.index, 0.0, frame.camera, frame.depth_m, labels=marked)
 
 
 def _mask(path: Path) -> UInt8[ndarray, "106 128"] | None:

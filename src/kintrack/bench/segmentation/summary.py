@@ -71,12 +71,14 @@ def _put(tree: dict[str, Any], value: object, *keys: str) -> None:
 def _labels(rows: Sequence[Judged]) -> dict[str, Any]:
     counts = np.sum([row.plain["counts"] for row in rows], axis=0)
     strict = np.sum([row.plain["counts_strict"] for row in rows], axis=0)
+    pixels = np.sum([row.plain["counts_of_pixels"] for row in rows], axis=0)
     unknown = strict.sum() - counts.sum()
     return {
         "recordings": len(rows),
         "frames": sum(row.plain["frames"] for row in rows),
         **scores_of(counts).summary(),
         "unknown": float(unknown / max(counts[1:].sum() + unknown, 1)),
+        "of_pixels": scores_of(pixels).summary(),
         "strict_non_background_iou": scores_of(strict).summary()["non_background_iou"],
     }
 

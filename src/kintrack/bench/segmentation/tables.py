@@ -105,6 +105,18 @@ def accuracy(content: dict[str, Any], group: str = TEST) -> Grid:
     return Grid("Accuracy [%]", header, rows)
 
 
+def of_pixels(content: dict[str, Any], group: str = TEST) -> Grid:
+    """The same and every part, judged where a tracker uses labels."""
+    header = ("network", "input", "object", "non-background IoU", "person's mask IoU",
+              "mean IoU of parts", *(part.replace("_", " ") for part in PARTS))  # fmt: skip
+    keys = ("non_background_iou", "person_iou", "mean_part_iou", *PARTS)
+    rows = [
+        (*where, *(_percent(found["of_pixels"][key]) for key in keys))
+        for where, found in _each(content, group)
+    ]
+    return Grid("Judged at the image's pixels with a reading [%]", header, rows)
+
+
 def parts(content: dict[str, Any], group: str = TEST) -> Grid:
     """Intersection over union of every part."""
     header = ("network", "input", "object", *(part.replace("_", " ") for part in PARTS))
@@ -224,7 +236,19 @@ def aims(content: dict[str, Any]) -> Grid:
 
 def all_grids(content: dict[str, Any]) -> list[Grid]:
     """Every table that has rows."""
-    makers = (counts, times, accuracy, parts, ablation, composites, mask, witness, joints, aims)
+    makers = (
+        counts,
+        times,
+        accuracy,
+        parts,
+        of_pixels,
+        ablation,
+        composites,
+        mask,
+        witness,
+        joints,
+        aims,
+    )
     return [grid for grid in (make(content) for make in makers) if grid.rows]
 
 
