@@ -81,10 +81,18 @@ def test_the_rival_is_the_unet_that_saw_objects_too(content):
     content["labels"][TEST]["unet"][RGBD][OBJECTS] = scores(0.91)
     content["labels"][TEST]["bare"][RGBD][OBJECTS] = scores(0.5)
     found = judged(content)
-    assert found["behind unet in that"]["measured"] == pytest.approx(3.0)
-    assert not found["behind unet in that"]["passed"]
-    assert found["time of unet's, int8"]["measured"] == 0.25
-    assert found["time of unet's, int8"]["passed"]
+    assert found["fast behind unet in that"]["measured"] == pytest.approx(3.0)
+    assert not found["fast behind unet in that"]["passed"]
+    assert found["time of fast, int8, of that of unet"]["measured"] == 0.25
+    assert found["time of fast, int8, of that of unet"]["passed"]
+
+
+def test_networks_are_only_compared_if_they_were_trained_alike(content):
+    content["networks"]["fast"]["training"]["steps"] = 9
+    assert not [what for what in judged(content) if "unet" in what]
+    content["networks"]["bare"]["training"]["steps"] = 9
+    content["targets"] = []
+    assert not [grid for grid in all_grids(content) if grid.title.startswith("Trained")]
 
 
 def test_every_table_is_as_wide_as_its_header(content):

@@ -155,7 +155,7 @@ def _kintrack(folder: Path, *words: str, processes: int = 1) -> None:
     command = [str(Path(sys.executable).with_name("kintrack")), *words]
     if processes > 1:
         launch = ["-m", "torch.distributed.run", "--standalone", "--nproc-per-node"]
-        command = [sys.executable, *launch, str(processes), *command]
+        command = [sys.executable, *launch, str(processes), "--", *command]
     done = subprocess.run(command, cwd=folder, check=False)
     if done.returncode == 130:
         raise KeyboardInterrupt

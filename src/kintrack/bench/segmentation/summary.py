@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -105,7 +105,7 @@ def targets(content: dict[str, Any]) -> list[dict[str, Any]]:
         What, measured, bound, whether at least or at most that is asked for, unit, and passed.
     """
     ships = content["order"][0]
-    rival = rival_of(content)
+    pair = rivals_of(content)
     at = content["labels"].get(TEST, {}).get(ships, {}).get(RGBD, {}).get(OBJECTS, {})
     rows = [
         _share("non-background IoU, objects at 30-60 cm", at.get("non_background_iou"), 85),
@@ -113,14 +113,16 @@ def targets(content: dict[str, Any]) -> list[dict[str, Any]]:
         *(_share(f"IoU of the {part.replace('_', ' ')}, the same", at.get(part), 75)
           for part in LABELS[1:]),
     ]  # fmt: skip
-    if rival is not None:
-        other = content["labels"][TEST][rival][RGBD][OBJECTS]["non_background_iou"]
-        gap = None if None in (other, at.get("non_background_iou")) else (
-            other - at["non_background_iou"])  # fmt: skip
-        rows.append(_share(f"behind {rival} in that", gap, 2, at_least=False, unit="points"))
-        times = [_median(content, name, SHIPPED_RUNTIME, "network") for name in (ships, rival)]
+    if pair is not None:
+        own, other = (content["labels"][TEST][name][RGBD][OBJECTS]["non_background_iou"]
+                      for name in pair)  # fmt: skip
+        gap = None if None in (own, other) else other - own
+        rows.append(_share(f"{pair[0]} behind {pair[1]} in that", gap, 2, at_least=False,
+                           unit="points"))  # fmt: skip
+        times = [_median(content, name, SHIPPED_RUNTIME, "network") for name in pair]
         ratio = times[0] / times[1] if times[0] and times[1] else None
-        rows.append(_row(f"time of {rival}'s, int8", ratio, 1 / 3, at_least=False, unit="times"))
+        rows.append(_row(f"time of {pair[0]}, int8, of that of {pair[1]}", ratio, 1 / 3,
+                         at_least=False, unit="times"))  # fmt: skip
     real = content["labels"].get(COMPOSITES, {}).get(ships, {}).get(DEPTH, {}).get(OBJECTS, {})
     rows.append(_share("non-background IoU, UTD-MHAD in real scenes with objects",
                        real.get("non_background_iou"), 75))  # fmt: skip
@@ -136,13 +138,49 @@ def targets(content: dict[str, Any]) -> list[dict[str, Any]]:
     return [row for row in rows if row["measured"] is not None]
 
 
-def rival_of(content: dict[str, Any]) -> str | None:
-    """The U-Net trained like the network that ships, if there is one."""
+def rivals_of(content: dict[str, Any]) -> tuple[str, str] | None:
+    """The first Fast-FCN and the first U-Net that were trained alike, if there are any."""
+    networks = content["networks"]
     for name in content["order"]:
-        facts = content["networks"][name]
-        if facts["architecture"] == "unet" and facts["inserted_objects"] is not False:
-            return str(name)
+        for rival in content["order"]:
+            kinds = networks[name]["architecture"], networks[rival]["architecture"]
+            if kinds == ("fast_fcn", "unet") and trained_alike(networks[name], networks[rival]):
+                return str(name), str(rival)
     return None
+
+
+def trained_alike(
+    one: Mapping[str, Any], other: Mapping[str, Any], but: Sequence[str] = ()
+) -> bool:
+    """Whether two networks saw the same data in the same way for as many steps.
+
+    Args:
+        one: Facts of a network.
+        other: Of another one.
+        but: Settings of the training that may differ, as `augment.inserted`.
+    """
+    alike = ("data", "steps", "training_pictures")
+    if any(one["training"].get(key) != other["training"].get(key) for key in alike):
+        return False
+    if bool(one["training"].get("start")) or bool(other["training"].get("start")):
+        return False
+    settings = [_flat(facts["training"].get("config", {})) for facts in (one, other)]
+    keys = set().union(*settings) - set(but)
+    return all(
+        settings[0].get(key) == settings[1].get(key)
+        for key in keys
+        if not key.startswith("network.")
+    )
+
+
+def _flat(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            found |= _flat(value, f"{prefix}{key}.")
+        else:
+            found[prefix + key] = value
+    return found
 
 
 def _median(content: dict[str, Any], network: str, runtime: str, part: str) -> float | None:

@@ -10,7 +10,7 @@ from kintrack.bench.cases import CLEAN
 from kintrack.bench.segmentation.cases import COMPOSITES, CONDITIONS, TEST
 from kintrack.bench.segmentation.runtimes import VARIANTS
 from kintrack.bench.segmentation.samples import DEPTH, MODALITIES, RGBD
-from kintrack.bench.segmentation.summary import OBJECTS
+from kintrack.bench.segmentation.summary import OBJECTS, trained_alike
 from segmentation.labels import LABELS
 
 PARTS = LABELS[1:]
@@ -136,6 +136,7 @@ def ablation(content: dict[str, Any]) -> Grid:
             continue
         for full, other in _ordered(content, content["networks"]):
             alike = all(other[key] == facts[key] for key in ("architecture", "widths"))
+            alike &= trained_alike(facts, other, but=("augment.inserted",))
             if other["inserted_objects"] is True and alike:
                 rows += _changes(content, bare, full)
     return Grid("Trained without inserted objects: non-background IoU [%]", header, rows)
