@@ -3,8 +3,8 @@
 
 import numpy as np
 
-from kintrack.config import PriorConfig, SurfaceConfig
 from kintrack.human import RESTING_DEG, posed, prior_sigma
+from kintrack.objective_config import PriorConfig, SurfaceConfig
 from kintrack.residuals.joints import JointResidual
 from kintrack.residuals.prior import diagonal_prior, gaussian_prior
 from kintrack.residuals.surface import silhouette_residual, surface_residual

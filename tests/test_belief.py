@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from kintrack.belief import coasted, first, predict, spread, updated
-from kintrack.config import MotionConfig, PriorConfig
 from kintrack.human import prior_sigma
+from kintrack.objective_config import MotionConfig, PriorConfig
 
 MOTION = MotionConfig()
 DT_S = 1 / 30

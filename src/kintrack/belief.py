@@ -10,8 +10,9 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from kintrack.body import Body, BodyState, run_kinematics
-from kintrack.config import MotionConfig, TrackerConfig
+from kintrack.config import TrackerConfig
 from kintrack.human import motion_sigma
+from kintrack.objective_config import MotionConfig
 from kintrack.residuals.prior import TangentPrior, diagonal_prior, gaussian_prior
 
 

@@ -8,6 +8,13 @@ from dataclasses import dataclass, field
 from kintrack.bounds import check_bounds
 from kintrack.deformation_config import DeformationConfig
 from kintrack.errors import ConfigError
+from kintrack.objective_config import (
+    ConfidenceConfig,
+    MotionConfig,
+    PriorConfig,
+    PullConfig,
+    SurfaceConfig,
+)
 from kintrack.rival_config import RivalConfig
 
 
@@ -71,32 +78,6 @@ class AssociationConfig:
 
 
 @dataclass(frozen=True)
-class SurfaceConfig:
-    """The data term."""
-
-    point_weight: float = 0.2
-    """Weight of point-to-point against point-to-plane."""
-    scale_floor_m: float = 0.008
-    """Least robust scale of the residuals [m]."""
-    scale_ceiling_m: float = 0.03
-    """Largest robust scale of the residuals [m]."""
-    silhouette_weight: float = 3.0
-    """Weight of skin outside the silhouette against a surface pair."""
-    correlation: float = 8.0
-    """How many neighbouring pairs carry the information of one independent pair."""
-
-    def __post_init__(self) -> None:
-        check_bounds(
-            self,
-            point_weight=(0.0, 10.0),
-            scale_floor_m=(1e-4, 0.1),
-            scale_ceiling_m=(1e-3, 1.0),
-            silhouette_weight=(0.0, 100.0),
-            correlation=(1.0, 1e4),
-        )
-
-
-@dataclass(frozen=True)
 class OcclusionConfig:
     """What counts as hidden by something else; only where the image is labelled."""
 
@@ -109,87 +90,6 @@ class OcclusionConfig:
 
     def __post_init__(self) -> None:
         check_bounds(self, nearer_m=(0.0, 1.0), behind_m=(0.0, 1.0), open_share=(0.0, 1.0))
-
-
-@dataclass(frozen=True)
-class ConfidenceConfig:
-    """What the solver's own covariance does not know; calibrated on training recordings."""
-
-    shared_m: float = 0.035
-    """Standard deviation of the error that all pairs of a link share: clothes, template [m]."""
-    floor_m: float = 0.025
-    """Standard deviation of a joint centre within a body that fits perfectly [m]."""
-
-    def __post_init__(self) -> None:
-        check_bounds(self, shared_m=(0.0, 1.0), floor_m=(0.0, 1.0))
-
-
-@dataclass(frozen=True)
-class PullConfig:
-    """How rough places of the parts pull while tracking."""
-
-    sigma_m: float = 0.1
-    """Standard deviation of a joint about its part's place, beyond the free distance [m]."""
-    free_m: float = 0.25
-    """A joint this near to its part's place is not pulled [m]."""
-
-    def __post_init__(self) -> None:
-        check_bounds(self, sigma_m=(1e-3, 1e6), free_m=(0.0, 10.0))
-
-
-@dataclass(frozen=True)
-class PriorConfig:
-    """What is known before a frame is seen."""
-
-    limb_rad: float = 0.4
-    """Standard deviation of arm and leg hinges about the resting pose [rad]."""
-    trunk_rad: float = 0.15
-    """Standard deviation of spine, neck, head and clavicle hinges about zero [rad]."""
-    twist_rad: float = 0.5
-    """Standard deviation of forearm, wrist and ankle hinges about zero [rad]."""
-    unseen_s: float = 2.0
-    """Time in which a limb that is not found, though nothing hides it, relaxes towards rest [s]."""
-
-    def __post_init__(self) -> None:
-        check_bounds(
-            self,
-            limb_rad=(0.01, 10),
-            trunk_rad=(0.01, 10),
-            twist_rad=(0.01, 10),
-            unseen_s=(0.01, 1e4),
-        )
-
-
-@dataclass(frozen=True)
-class MotionConfig:
-    """Constant-velocity prediction."""
-
-    root_m_s: float = 1.5
-    """Standard deviation of the root's unpredicted speed [m/s]."""
-    root_rad_s: float = 3.0
-    """Standard deviation of the root's unpredicted angular speed [rad/s]."""
-    limb_rad_s: float = 8.0
-    """Standard deviation of unpredicted hinge speed in arms and legs [rad/s]."""
-    trunk_rad_s: float = 2.5
-    """Standard deviation of unpredicted hinge speed in trunk, neck and clavicles [rad/s]."""
-    damping: float = 0.7
-    """Share of the last velocity that is carried on."""
-    hidden_s: float = 1.0
-    """Time in which a hidden limb may have gone anywhere [s]."""
-    habit_s: float = 1.0
-    """Time over which the posture is averaged to which a hidden limb returns [s]."""
-
-    def __post_init__(self) -> None:
-        check_bounds(
-            self,
-            root_m_s=(1e-3, 100),
-            root_rad_s=(1e-3, 100),
-            limb_rad_s=(1e-3, 200),
-            trunk_rad_s=(1e-3, 200),
-            damping=(0, 1),
-            hidden_s=(1e-3, 1e4),
-            habit_s=(1e-3, 1e4),
-        )
 
 
 SOLVER_METHODS = ("gauss-newton", "ipopt")

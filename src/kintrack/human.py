@@ -11,7 +11,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.body import Body, load_body
-from kintrack.config import MotionConfig, PriorConfig
+from kintrack.objective_config import MotionConfig, PriorConfig
 from kintrack.skin import Skin, load_skin
 
 RESTING_DEG = {

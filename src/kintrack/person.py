@@ -10,9 +10,10 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.association.observation import Observation
-from kintrack.config import JudgeConfig, PullConfig
+from kintrack.config import JudgeConfig
 from kintrack.geometry import transform_points
 from kintrack.labelled_config import LabelledConfig, LifecycleConfig, Limits
+from kintrack.objective_config import PullConfig
 from kintrack.people import find_people, only
 from kintrack.residuals.targets import TargetResidual
 from kintrack.targets import find_targets

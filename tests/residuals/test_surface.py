@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from kintrack.body import run_kinematics
-from kintrack.config import SurfaceConfig
 from kintrack.errors import AssociationError
+from kintrack.objective_config import SurfaceConfig
 from kintrack.residuals.surface import surface_residual
 from kintrack.skin import skinned_vertices, vertex_normals
 

@@ -15,11 +15,12 @@ from numpy import ndarray
 from kintrack.bench.cases import ALONE, CLEAN, GAPS, REAL, ROOM, SCENES, Case
 from kintrack.bench.rgb import regress
 from kintrack.calibration.config import BodyConfig
-from kintrack.config import PullConfig, TrackerConfig
+from kintrack.config import TrackerConfig
 from kintrack.errors import ConfigError
 from kintrack.fit import fit_sequence
 from kintrack.geometry import camera_pose
 from kintrack.joints import JOINT_NAMES
+from kintrack.objective_config import PullConfig
 from kintrack.segmenter import Segmenter
 from kintrack.sequence import open_sequence
 from kintrack.sequence.frame import Frame

@@ -16,9 +16,9 @@ from numba import njit
 from numpy import ndarray
 
 from kintrack.body import BodyState
-from kintrack.config import SurfaceConfig
 from kintrack.errors import AssociationError
 from kintrack.geometry import huber_weights, robust_scale, tukey_weights
+from kintrack.objective_config import SurfaceConfig
 from kintrack.residuals.linearization import Linearization, Quadratic, Residual
 from kintrack.skin import Skin, skinned_vertices, vertex_jacobians
 
