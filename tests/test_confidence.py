@@ -4,9 +4,10 @@ import pytest
 
 from kintrack.body import joint_jacobians, run_kinematics
 from kintrack.confidence import joint_covariances
+from kintrack.config import ConfidenceConfig
 from kintrack.human import prior_sigma
 from kintrack.joints import JOINT_NAMES
-from kintrack.objective_config import ConfidenceConfig, PriorConfig, SurfaceConfig
+from kintrack.objective_config import PriorConfig, SurfaceConfig
 from kintrack.residuals.prior import diagonal_prior
 from kintrack.residuals.surface import surface_residual
 from kintrack.skin import skinned_vertices, vertex_jacobians, vertex_normals

@@ -17,7 +17,7 @@ from numba import njit
 from numpy import ndarray
 
 from kintrack.body import BodyState, joint_jacobians
-from kintrack.objective_config import ConfidenceConfig
+from kintrack.config import ConfidenceConfig
 from kintrack.residuals.surface import SurfaceResidual
 
 

@@ -9,7 +9,6 @@ from kintrack.bounds import check_bounds
 from kintrack.deformation_config import DeformationConfig
 from kintrack.errors import ConfigError
 from kintrack.objective_config import (
-    ConfidenceConfig,
     MotionConfig,
     PriorConfig,
     PullConfig,
@@ -90,6 +89,19 @@ class OcclusionConfig:
 
     def __post_init__(self) -> None:
         check_bounds(self, nearer_m=(0.0, 1.0), behind_m=(0.0, 1.0), open_share=(0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class ConfidenceConfig:
+    """What the solver's own covariance does not know; calibrated on training recordings."""
+
+    shared_m: float = 0.035
+    """Standard deviation of the error that all pairs of a link share: clothes, template [m]."""
+    floor_m: float = 0.025
+    """Standard deviation of a joint centre within a body that fits perfectly [m]."""
+
+    def __post_init__(self) -> None:
+        check_bounds(self, shared_m=(0.0, 1.0), floor_m=(0.0, 1.0))
 
 
 SOLVER_METHODS = ("gauss-newton", "ipopt")

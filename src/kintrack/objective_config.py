@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every number of what a pose minimises, with its unit: data term, pulls, prior, motion, trust."""
+"""Every number of what a pose minimises, with its unit: data term, pulls, prior, motion."""
 
 from __future__ import annotations
 
@@ -32,19 +32,6 @@ class SurfaceConfig:
             silhouette_weight=(0.0, 100.0),
             correlation=(1.0, 1e4),
         )
-
-
-@dataclass(frozen=True)
-class ConfidenceConfig:
-    """What the solver's own covariance does not know; calibrated on training recordings."""
-
-    shared_m: float = 0.035
-    """Standard deviation of the error that all pairs of a link share: clothes, template [m]."""
-    floor_m: float = 0.025
-    """Standard deviation of a joint centre within a body that fits perfectly [m]."""
-
-    def __post_init__(self) -> None:
-        check_bounds(self, shared_m=(0.0, 1.0), floor_m=(0.0, 1.0))
 
 
 @dataclass(frozen=True)

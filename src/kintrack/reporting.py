@@ -13,11 +13,11 @@ from kintrack.alignment import Fit, View
 from kintrack.association.observation import Observation
 from kintrack.body import Body, BodyState, joint_jacobians
 from kintrack.confidence import joint_covariances
+from kintrack.config import ConfidenceConfig
 from kintrack.geometry import transform_points
 from kintrack.joints import JOINT_NAMES
 from kintrack.judge import Agreement, joint_visibility, label_agreement, label_counts
 from kintrack.lifecycle import Reading
-from kintrack.objective_config import ConfidenceConfig
 from kintrack.result import FrameResult
 from kintrack.sequence.frame import Frame
 

@@ -27,11 +27,13 @@ def scores(right):
 
 
 def network(architecture, inserted=True):
+    config = {"seed": 7, "network": {"architecture": architecture},
+              "augment": {"inserted": 0.6 if inserted else 0.0}}  # fmt: skip
     return {"architecture": architecture, "widths": [1, 2], "parameters": 5_000_000, "gflop": 9.5,
             "convolutions": 9, "poolings": 3, "deconvolutions": 3, "bytes": 12_000_000,
             "sha256": "ab" * 32, "runtime": "openvino-int8", "inserted_objects": inserted,
             "training": {"data": ["training"], "command": "kintrack train /a/training -o run",
-                         "config": {"seed": 7, "augment": {"inserted": 0.6}}}}  # fmt: skip
+                         "steps": 5, "config": config}}  # fmt: skip
 
 
 def times(ms):
@@ -87,12 +89,19 @@ def test_the_rival_is_the_unet_that_saw_objects_too(content):
     assert found["time of fast, int8, of that of unet"]["passed"]
 
 
-def test_networks_are_only_compared_if_they_were_trained_alike(content):
-    content["networks"]["fast"]["training"]["steps"] = 9
-    assert not [what for what in judged(content) if "unet" in what]
-    content["networks"]["bare"]["training"]["steps"] = 9
+@pytest.mark.parametrize("told", [{"steps": 9}, {"steps": None}, {"start": {"steps": 3}},
+                                  {"data": ["other"]}])  # fmt: skip
+def test_networks_are_only_compared_if_they_were_trained_alike(content, told):
     content["targets"] = []
+    for name in ("fast", "bare"):
+        content["networks"][name]["training"] |= told
+    assert not [what for what in judged(content) if "unet" in what]
     assert not [grid for grid in all_grids(content) if grid.title.startswith("Trained")]
+
+
+def test_another_seed_is_another_training(content):
+    content["networks"]["fast"]["training"]["config"]["seed"] = 8
+    assert not [what for what in judged(content) if "unet" in what]
 
 
 def test_every_table_is_as_wide_as_its_header(content):

@@ -124,9 +124,9 @@ hides a third of the person; its farthest point lies 30, 45 or 60 cm before her 
 
 {_grid(tables.parts(content))}
 
-Labels of a second look have cells of their own, which lie askew to those of the whole image: judged
-at the network's size, parts a few cells wide lose by that alone. A tracker uses the labels of the
-depth image's pixels (every other one of 512 x 424); judged there:
+A tracker uses labels of the depth image's pixels, every other one of 512 x 424. At the network's size
+a second look is judged by the most frequent of the four such labels in a cell, the background where
+they tie, and its own cells lie askew to those: parts a few cells wide lose by that. At the pixels:
 
 {_grid(tables.of_pixels(content))}
 

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from kintrack.bench.segmentation.summary import settings
 from kintrack.bench.segmentation.tables import (
     Grid,
     accuracy,
@@ -131,18 +132,8 @@ def _training(training: Mapping[str, Any]) -> dict[str, str]:
 
 def _settings(training: Mapping[str, Any]) -> Grid:
     """Every setting of the training."""
-    config = training.get("config")
-    flat = dict(_flat(config)) if isinstance(config, Mapping) else {}
-    rows = [(key, _text(value)) for key, value in flat.items()]
+    rows = [(key, _text(value)) for key, value in settings(training).items()]
     return Grid("Settings", ("setting", "value"), rows)
-
-
-def _flat(tree: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
-    rows: list[tuple[str, Any]] = []
-    for key, value in tree.items():
-        rows += _flat(value, f"{before}{key}.") if isinstance(value, Mapping) else (
-            [(f"{before}{key}", value)])  # fmt: skip
-    return rows
 
 
 def _only(groups: Mapping[str, Any], name: str) -> dict[str, Any]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -150,37 +150,39 @@ def rivals_of(content: dict[str, Any]) -> tuple[str, str] | None:
 
 
 def trained_alike(
-    one: Mapping[str, Any], other: Mapping[str, Any], but: Sequence[str] = ()
+    one: Mapping[str, Any], other: Mapping[str, Any], but: Sequence[str] = ("network.",)
 ) -> bool:
-    """Whether two networks saw the same data in the same way for as many steps.
+    """Whether two networks were trained from nothing on the same data, as long and in the same way.
+
+    Networks that do not tell count as trained in different ways.
 
     Args:
         one: Facts of a network.
         other: Of another one.
-        but: Settings of the training that may differ, as `augment.inserted`.
+        but: How the names of settings begin that may differ.
     """
-    alike = ("data", "steps", "training_pictures")
-    if any(one["training"].get(key) != other["training"].get(key) for key in alike):
+    said = one["training"], other["training"]
+    if any(not training.get("steps") or training.get("start") for training in said):
         return False
-    if bool(one["training"].get("start")) or bool(other["training"].get("start")):
-        return False
-    settings = [_flat(facts["training"].get("config", {})) for facts in (one, other)]
-    keys = set().union(*settings) - set(but)
-    return all(
-        settings[0].get(key) == settings[1].get(key)
-        for key in keys
-        if not key.startswith("network.")
-    )
+    told = [
+        {key: training.get(key) for key in ("data", "steps", "training_pictures")}
+        | {key: x for key, x in settings(training).items() if not key.startswith(tuple(but))}
+        for training in said
+    ]
+    return told[0] == told[1]
 
 
-def _flat(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
+def settings(training: Mapping[str, Any]) -> dict[str, Any]:
+    """Every setting of a training by its dotted name; none if the weights tell none."""
+    return dict(_leaves(training.get("config") or {}))
+
+
+def _leaves(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     for key, value in tree.items():
         if isinstance(value, Mapping):
-            found |= _flat(value, f"{prefix}{key}.")
+            yield from _leaves(value, f"{before}{key}.")
         else:
-            found[prefix + key] = value
-    return found
+            yield before + key, value
 
 
 def _median(content: dict[str, Any], network: str, runtime: str, part: str) -> float | None:
