@@ -28,7 +28,7 @@ def scores(right):
 
 def network(architecture, inserted=True):
     config = {"seed": 7, "network": {"architecture": architecture},
-              "augment": {"inserted": 0.6 if inserted else 0.0}}  # fmt: skip
+              "steps": 0, "augment": {"inserted": 0.6 if inserted else 0.0}}  # fmt: skip
     return {"architecture": architecture, "widths": [1, 2], "parameters": 5_000_000, "gflop": 9.5,
             "convolutions": 9, "poolings": 3, "deconvolutions": 3, "bytes": 12_000_000,
             "sha256": "ab" * 32, "runtime": "openvino-int8", "inserted_objects": inserted,

@@ -164,17 +164,19 @@ def trained_alike(
     said = one["training"], other["training"]
     if any(not training.get("steps") or training.get("start") for training in said):
         return False
-    told = [
-        {key: training.get(key) for key in ("data", "steps", "training_pictures")}
-        | {key: x for key, x in settings(training).items() if not key.startswith(tuple(but))}
+    if any(said[0].get(key) != said[1].get(key) for key in ("data", "steps", "training_pictures")):
+        return False
+    own, others = (
+        {key: value for key, value in settings(training).items() if not key.startswith(tuple(but))}
         for training in said
-    ]
-    return told[0] == told[1]
+    )
+    return own == others
 
 
 def settings(training: Mapping[str, Any]) -> dict[str, Any]:
     """Every setting of a training by its dotted name; none if the weights tell none."""
-    return dict(_leaves(training.get("config") or {}))
+    config = training.get("config")
+    return dict(_leaves(config)) if isinstance(config, Mapping) else {}
 
 
 def _leaves(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
