@@ -110,15 +110,12 @@ def test_the_template_stays_where_it_is_wanted(tall, tmp_path):
     assert len(summary["person"]["shape"]) == 3 and said_of_body(summary["body"]) == []
 
 
-def test_who_stands_still_is_tracked_with_the_template(scene, tmp_path):
+def test_who_stands_still_gets_a_body_too(scene, tmp_path):
     still = filmed(scene, tmp_path / "still", scene.human, moves=0.0, frames=10)
     fit_sequence(still, tmp_path / "result", body=QUICK)
     body = summary_of(tmp_path / "result")["body"]
-    assert body["used"] == "template" and len(body["attempts"]) == 2
-    said = said_of_body(body)
-    assert said[0] == "nothing estimated"
-    assert "the frames differ by" in said[1] and "move arms and legs" in said[1]
-    assert said[2] == "tracked with the template; see docs/shape.md"
+    assert body["used"] == "calibrated" and len(body["attempts"]) == 1
+    assert body["attempts"][0]["problems"] == []
 
 
 def test_a_child_is_tracked_with_the_template_and_the_reason(scene, tmp_path):

@@ -24,7 +24,7 @@ from kintrack.calibration.errors import CalibrationError
 from kintrack.calibration.measures import Length, height, measured
 from kintrack.calibration.person import Person
 from kintrack.calibration.selection import spread, varied
-from kintrack.calibration.verdict import LIMITS, problems_of
+from kintrack.calibration.verdict import LIMITS, Limits, problems_of
 from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
@@ -118,8 +118,11 @@ class Calibrator:
         joints = np.stack([c.joints_m for c in self.candidates])
         return spread(joints[self._varied(self.config.frames)])
 
-    def result(self) -> Person:
+    def result(self, limits: Limits = LIMITS) -> Person:
         """The person, or the template with the reasons why.
+
+        Args:
+            limits: Whom to believe.
 
         Raises:
             CalibrationError: if no frame was added, or none shows the person.
@@ -132,7 +135,7 @@ class Calibrator:
         chosen = [self.candidates[i] for i in self._varied(self.config.frames)]
         with threadpool_limits(1, user_api="blas"):
             bundle = self._solve(chosen, self._stated())
-        return self._person(bundle, chosen)
+        return self._person(bundle, chosen, limits)
 
     def _varied(self, count: int) -> ndarray:
         joints = np.stack([c.joints_m for c in self.candidates])
@@ -177,7 +180,7 @@ class Calibrator:
         sigma = self.config.stated_sigma_m
         return [Measurement(padded, self.stated_height_m - average, sigma)]
 
-    def _person(self, bundle: Bundle, chosen: Sequence[Candidate]) -> Person:
+    def _person(self, bundle: Bundle, chosen: Sequence[Candidate], limits: Limits) -> Person:
         k = len(load_shape_space(self.human.folder))
         b, covariance = bundle.b[:k], bundle.covariance[:k, :k]
         tall, limbs = measured(b, covariance, self.human.folder)
@@ -195,7 +198,7 @@ class Calibrator:
         )
         leading = load_shape_space(self.human.folder).rig.explained > LEADING
         at_limit = bool((np.abs(b[leading]) > self.config.shape_limit - 1e-6).any())
-        problems = problems_of(found, at_limit, self._unstated(chosen))
+        problems = problems_of(found, at_limit, self._unstated(chosen), limits)
         return found if not problems else replace(found, shape=np.zeros(k), problems=problems)
 
     def _unstated(self, chosen: Sequence[Candidate]) -> Length | None:

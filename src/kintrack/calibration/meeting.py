@@ -14,7 +14,7 @@ from kintrack.calibration.config import MeetingConfig
 from kintrack.calibration.errors import CalibrationError
 from kintrack.calibration.person import Person
 from kintrack.calibration.recording import person_in
-from kintrack.calibration.verdict import too_alike
+from kintrack.calibration.verdict import ROUGH
 from kintrack.config import TrackerConfig
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.human import Human
@@ -132,12 +132,8 @@ class Meeting:
         """Make an attempt."""
         assert self._calibrator is not None
         self._due_s = self.config.growth * self._tracked_s
-        alike = too_alike(self._calibrator.spread_m())
-        if alike is not None:
-            self.attempts.append(Attempt(frame, self._tracked_s, "", (alike,)))
-            return None
         try:
-            person = self._calibrator.result()
+            person = self._calibrator.result(ROUGH)
         except CalibrationError as error:
             self.attempts.append(Attempt(frame, self._tracked_s, "", (str(error),)))
             return None

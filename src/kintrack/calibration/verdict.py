@@ -29,6 +29,10 @@ class Limits(NamedTuple):
 
 
 LIMITS = Limits()
+"""Somebody who is named: measured once, and known from then on."""
+ROUGH = Limits(least_spread_m=0.0, height_sigma_m=0.10, limb_share=0.15)
+"""Somebody who is only tracked: an estimate in doubt, clothes included, is nearer to her than the
+average adult, bare, as long as it says more than the population's spread does."""
 
 
 def problems_of(
