@@ -11,8 +11,7 @@ Bundle adjustment, 1999, section 6.1].
 The pairs say less than their number suggests, by a factor c = inflation (rms / usual_rms)^4: with
 H_seen the matrix of all frames, poses eliminated, and H_known that of prior and measurements, the
 covariance is (H_seen / c + H_known)^-1. In the fit itself a measurement weighs c-fold against the
-pairs for the same reason; the prior weighs the fourth root of that, for all of it would hold
-unusual people back, and with none of it people who sit are taken for small ones.
+pairs for the same reason; the prior does not, for it would hold unusual people back.
 """
 
 from __future__ import annotations
@@ -32,9 +31,6 @@ from kintrack.human import RESTING_DEG, Human, posed, prior_sigma
 from kintrack.residuals.prior import diagonal_prior
 from kintrack.shape import ShapeSpace
 from kintrack.solver.gauss_newton import bounded_step, step_bounds
-
-PRIOR_POWER = 0.25
-"""Power of the pairs' doubt by which the prior gains weight in the fit; see above."""
 
 
 @dataclass(frozen=True)
@@ -144,13 +140,13 @@ def solve_bundle(
 
 
 def _known(
-    b: ndarray, prior: Gaussian, measurements: Sequence[Measurement], doubt: float = 1.0
+    b: ndarray, prior: Gaussian, measurements: Sequence[Measurement], measured: float = 1.0
 ) -> tuple[ndarray, ndarray]:
-    """Matrix and gradient of prior and measurements against pairs that are in doubt by a factor."""
-    precision = max(1.0, doubt) ** PRIOR_POWER / prior.sigma**2
-    H, g = np.diag(precision), precision * (b - prior.mean)
+    """Matrix and gradient of prior and measurements, the latter `measured` times as heavy."""
+    H = np.diag(prior.sigma**-2.0)
+    g = (b - prior.mean) / prior.sigma**2
     for m in measurements:
-        weight = doubt / m.sigma**2
+        weight = measured / m.sigma**2
         H = H + weight * np.outer(m.gradient, m.gradient)
         g = g + weight * m.gradient * (m.gradient @ b - m.value)
     return H, g
