@@ -123,7 +123,9 @@ def test_a_calibrator_keeps_the_frames_that_differ_most(tall):
         k = 0 if n < 24 else n % 6
         calibrator.add(n, tall.observations[k], tall.qs_template[k])
         assert len(calibrator.candidates) <= config.pool
-        assert (calibrator.spread_m() > 0.05) == (n >= 25)
+        joints = np.stack([candidate.joints_m for candidate in calibrator.candidates])
+        chosen = varied(joints, np.ones(len(joints)), config.frames)
+        assert (spread(joints[chosen]) > 0.05) == (n >= 25)
     assert len({candidate.index for candidate in calibrator.candidates if candidate.index > 23}) > 2
 
 

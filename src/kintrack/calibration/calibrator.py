@@ -111,13 +111,6 @@ class Calibrator:
             kept = self._varied(self.config.pool - self.config.pool // 4)
             self.candidates = [self.candidates[i] for i in kept]
 
-    def spread_m(self) -> float:
-        """How much the frames that would be used differ on average [m]; 0 if there are none."""
-        if not self.candidates:
-            return 0.0
-        joints = np.stack([c.joints_m for c in self.candidates])
-        return spread(joints[self._varied(self.config.frames)])
-
     def result(self, limits: Limits = LIMITS) -> Person:
         """The person, or the template with the reasons why.
 

@@ -89,7 +89,7 @@ def problems_of(
     return tuple(found)
 
 
-def too_alike(spread_m: float, limits: Limits = LIMITS) -> str | None:
+def too_alike(spread_m: float, limits: Limits) -> str | None:
     """Why frames that differ so much on average [m] are not enough; None if they are."""
     if spread_m >= limits.least_spread_m:
         return None
