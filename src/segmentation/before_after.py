@@ -27,7 +27,7 @@ from segmentation.weights import Weights
 
 OCCLUDED = AugmentConfig(
     zoomed=0.0, mirrored=0.0, inserted=1.0, nobody=0.0, other_room=0.0, background_removed=0.0,
-    depth_only=0.0, recolored=0.0, spoilt=0.0, focal_spread=0.0,
+    depth_only=0.0, recolored=0.0, spoilt=0.0, absorbed=0.0, focal_spread=0.0,
 )  # fmt: skip
 """Objects are put in and nothing else is changed; a picture without background may get a room."""
 FRAMES = 300

@@ -14,7 +14,7 @@ from kintrack.bounds import check_bounds
 from segmentation.augment.color import recolored
 from segmentation.augment.geometry import Warp, around, cut, draw_around, draw_warp, warped, whole
 from segmentation.augment.insertion import Cutouts, insert, put_behind, without_background
-from segmentation.augment.noise import draw_faults, spoilt
+from segmentation.augment.noise import absorbed, draw_faults, spoilt
 from segmentation.errors import SegmentationError
 from segmentation.labels import BACKGROUND, IGNORED, person_of
 from segmentation.picture import Picture
@@ -62,13 +62,15 @@ class AugmentConfig:
     """Chance that colours change."""
     spoilt: float = 0.8
     """Chance of further sensor noise."""
+    absorbed: float = 0.15
+    """Chance that what is dark returns no depth, where there is colour."""
     focal_spread: float = 0.02
     """Standard deviation of the relative error of the focal length."""
 
     def __post_init__(self) -> None:
         chances = ("region", "zoomed", "cut", "mirrored", "inserted", "most_hidden", "nobody",
                    "other_room", "background_removed", "depth_only", "recolored",
-                   "spoilt")  # fmt: skip
+                   "spoilt", "absorbed")  # fmt: skip
         check_bounds(self, roll_deg=(0, 45), focal_spread=(0, 0.2),
                      **dict.fromkeys(chances, (0.0, 1.0)))  # fmt: skip
         if len(self.zooms) != 2 or not 0.25 <= self.zooms[0] <= self.zooms[1] <= 8.0:
@@ -138,12 +140,13 @@ def changed(
     if rng.random() < config.inserted:
         for _ in range(1 + int(rng.integers(0, MOST_INSERTED))):
             view = insert(view, bank.cutouts, config.most_hidden * rng.uniform(0.3, 1.0), rng)
-    color = view.color
+    color, depth = view.color, view.depth_m
+    if color is not None and config.absorbed and rng.random() < config.absorbed:
+        depth = absorbed(depth, color, rng)
     if chance["color"] < config.depth_only:
         color = None
     if color is not None and chance["tint"] < config.recolored:
         color = recolored(color, rng)
-    depth = view.depth_m
     if chance["noise"] < config.spoilt:
         depth = spoilt(depth, draw_faults(rng), rng)
     labels = np.where((depth == 0) & (view.labels != IGNORED), np.uint8(BACKGROUND), view.labels)
