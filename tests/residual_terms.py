@@ -3,9 +3,13 @@
 
 import numpy as np
 
+from kintrack.floor import Floor, soles_of
+from kintrack.floor_config import FloorConfig
 from kintrack.human import RESTING_DEG, posed, prior_sigma
 from kintrack.objective_config import PriorConfig, SurfaceConfig
+from kintrack.residuals.contact import Contact, contact_residual
 from kintrack.residuals.joints import JointResidual
+from kintrack.residuals.pose_prior import load_leg_prior
 from kintrack.residuals.prior import diagonal_prior, gaussian_prior
 from kintrack.residuals.surface import silhouette_residual, surface_residual
 from kintrack.residuals.targets import TargetResidual
@@ -25,6 +29,18 @@ def silhouette(human, state, rng):
     vertex = rng.choice(len(vertices), 60)
     points = vertices[vertex] + rng.normal(0, 0.1, (60, 3))
     return silhouette_residual(human.skin, vertex, points, vertices, SurfaceConfig())
+
+
+def contact(human, state, rng):
+    vertices, soles = skinned_vertices(state, human.skin), soles_of(human)
+    up = np.array([0.05, -0.03, 1.0]) / np.linalg.norm([0.05, -0.03, 1.0])
+    floor = Floor(up, float(vertices[soles[0, 0]] @ up))
+    return contact_residual(human.skin, Contact(floor, soles), vertices, FloorConfig())
+
+
+def leg_prior(human, state, rng):
+    doubt = rng.uniform(1.0, 5.0, human.body.nv)
+    return load_leg_prior(human.body, PriorConfig()).near(state.q, doubt)
 
 
 def pose_prior(human, state, rng):
@@ -51,6 +67,6 @@ def targets(human, state, rng):
     return TargetResidual(rows, state.joint_positions_world[rows] + away, 0.1, 0.2)
 
 
-SQUARES = (surface, silhouette, pose_prior, motion_prior, joints)
+SQUARES = (surface, silhouette, contact, leg_prior, pose_prior, motion_prior, joints)
 """Terms that the nonlinear programme takes as they are."""
 TERMS = (*SQUARES, targets)

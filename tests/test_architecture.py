@@ -17,6 +17,7 @@ ROWS = (
         "bounds",
         "config",
         "deformation_config",
+        "floor_config",
         "labelled_config",
         "objective_config",
         "rival_config",
@@ -29,7 +30,7 @@ ROWS = (
     ("sequence", "segmenter"),
     ("association",),
     ("deformation",),
-    ("sides", "people", "targets", "lifecycle"),
+    ("sides", "people", "targets", "lifecycle", "floor"),
     ("whereabouts",),
     ("residuals",),
     ("belief", "confidence"),
@@ -65,6 +66,7 @@ FORBIDDEN_CALLS = {"eval", "exec", "compile", "__import__"}
 HEAVY = {
     "kintrack/modelling/": {"torch", "anny", "pymeshlab", "trimesh", "skimage"},
     "synthesis/people/build.py": {"torch", "anny"},
+    "synthesis/motions/habits.py": {"sklearn"},
     "synthesis/objects/files.py": {"trimesh", "PIL"},
     "synthesis/render/": {"embreex"},
     "segmentation/networks.py": {"torch"},
@@ -80,8 +82,8 @@ HEAVY = {
     "kintrack/bench/rgb_worker.py": {"mediapipe"},
 }
 """Who may import which of the packages that not everybody has."""
-ALL_HEAVY = {"torch", "anny", "pymeshlab", "trimesh", "embreex", "skimage", "PIL", "openvino",
-             "casadi"}  # fmt: skip
+ALL_HEAVY = {"torch", "anny", "pymeshlab", "trimesh", "embreex", "skimage", "sklearn", "PIL",
+             "openvino", "casadi"}  # fmt: skip
 ONLY_TO_TEST = {"pytest", "mujoco", "yourdfpy"}
 
 FILES = sorted(SOURCE.rglob("*.py"))

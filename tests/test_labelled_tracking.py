@@ -91,15 +91,16 @@ def test_a_wall_and_a_box_do_not_attract_a_labelled_person(scene, gated):
     assert errors(scene, results)[:, UPPER].mean() < 0.02
 
 
-def test_hidden_legs_stay_where_they_were(scene, gated):
+def test_hidden_legs_stay_near_where_they_were(scene, gated):
+    """What is usual draws them, too."""
     _, results = gated
-    assert errors(scene, results)[-1, LEGS].max() < 0.06
+    assert errors(scene, results)[-1, LEGS].max() < 0.08
 
 
-def test_hidden_joints_are_reported_as_not_seen_and_less_and_less_sure(gated):
+def test_hidden_joints_are_reported_as_not_seen_and_soon_as_sure_as_what_is_usual(gated):
     _, results = gated
     spread = np.array([np.trace(r.joint_covariances_m2[LEGS[1]]) for r in results])
-    assert spread[-4:].mean() > 1.2 * spread[3:7].mean() > 2 * spread[:2].mean()
+    assert spread[3:].min() > 2 * spread[:2].mean()
     assert results[-1].joint_visible[FEET].max() < 0.1
     assert results[-1].joint_visible[UPPER].min() > 0.5
 

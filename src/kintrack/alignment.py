@@ -18,6 +18,7 @@ from kintrack.body import BodyState, run_kinematics
 from kintrack.config import TrackerConfig
 from kintrack.geometry import invert_rigid, transform_points
 from kintrack.human import Human
+from kintrack.residuals.contact import Contact, contact_residual
 from kintrack.residuals.linearization import Residual
 from kintrack.residuals.surface import SurfaceResidual, silhouette_residual, surface_residual
 from kintrack.skin import skinned_vertices, vertex_normals
@@ -73,6 +74,7 @@ def fit_pose(
     gates_m: Sequence[float],
     clock: Callable[[str], None] = lambda stage: None,
     view: View | None = None,
+    contact: Contact | None = None,
 ) -> Fit:
     """Fit a pose: one association per gate, a few Gauss-Newton steps each.
 
@@ -86,6 +88,7 @@ def fit_pose(
         gates_m: Largest pair distance of each round [m].
         clock: Called after each stage with its name.
         view: The skin at q, if the caller has it.
+        contact: Soles that stand on the floor; None for none.
 
     Returns:
         The fit; once no joint moves, only the last gate is still tried.
@@ -145,10 +148,13 @@ def fit_pose(
             vertices_world,
             config.surface,
         )
+        data = surface.joined(outside)
+        if contact is not None:
+            data = data.joined(contact_residual(human.skin, contact, vertices_world, config.floor))
         view = None
         before = state.joint_positions_world
         solution = SOLVERS[config.solver.method](
-            human.body, state, [surface.joined(outside), *priors], config.solver.steps, damping
+            human.body, state, [data, *priors], config.solver.steps, damping
         )
         state, damping = solution.state, solution.damping
         iterations += solution.steps

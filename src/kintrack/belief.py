@@ -11,8 +11,9 @@ from numpy import ndarray
 
 from kintrack.body import Body, BodyState, run_kinematics
 from kintrack.config import TrackerConfig
-from kintrack.human import motion_sigma
+from kintrack.human import leg_hinges, motion_sigma
 from kintrack.objective_config import MotionConfig
+from kintrack.residuals.pose_prior import LegPrior
 from kintrack.residuals.prior import TangentPrior, diagonal_prior, gaussian_prior
 
 
@@ -105,24 +106,37 @@ def spread(
     return covariance + np.diag(added)
 
 
-def rest_prior(
+def rest_priors(
+    body: Body,
+    legs: LegPrior,
     resting: Float[ndarray, " nq"],
     sigma: Float[ndarray, " nv"],
+    q: Float[ndarray, " nq"],
     unseen: Bool[ndarray, " nv"],
     hidden: Bool[ndarray, " nv"],
     frames: float,
-) -> TangentPrior:
-    """Towards rest; slowly for limbs that were not found, not at all for hidden ones.
+) -> list[TangentPrior]:
+    """Legs towards the postures they take, all else towards rest; slowly what is not found.
+
+    Hidden legs are held, too, since they carry the body and go with it. A hidden arm may do
+    anything: it is left to its habit.
 
     Args:
+        body: The body.
+        legs: What postures legs take.
         resting: Posture at rest.
         sigma: Standard deviation of every hinge about it [rad].
+        q: Where the body is expected.
         unseen: Hinges that were not found.
         hidden: Hinges that are hidden.
         frames: In so many frames a limb that is not found relaxes.
     """
-    sigma = np.where(unseen, sigma * np.sqrt(max(frames, 1.0)), sigma)
-    return diagonal_prior(resting, np.where(hidden, np.inf, sigma))
+    slowly = np.where(unseen, np.sqrt(max(frames, 1.0)), 1.0)
+    if not (hidden & leg_hinges(body)).any():
+        return [diagonal_prior(resting, np.where(hidden, np.inf, slowly * sigma))]
+    free = hidden | leg_hinges(body)
+    held = diagonal_prior(resting, np.where(free, np.inf, slowly * sigma))
+    return [legs.near(q, np.where(hidden, 1.0, slowly)), held]
 
 
 def updated(
@@ -182,6 +196,7 @@ def _angles(q: Float[ndarray, " nq"]) -> Float[ndarray, " nv"]:
 def tracking_priors(
     awaited: BodyState,
     belief: Belief,
+    legs: LegPrior,
     resting: Float[ndarray, " nq"],
     rest_sigma: Float[ndarray, " nv"],
     unseen: Bool[ndarray, " nv"],
@@ -189,11 +204,12 @@ def tracking_priors(
     timestamp_s: float,
     config: TrackerConfig,
 ) -> list[TangentPrior]:
-    """What is known of a tracked body before its pixels are asked: its motion, and rest.
+    """What is known of a tracked body before its pixels are asked: its motion, and its posture.
 
     Args:
         awaited: The body as it is predicted.
         belief: The last one.
+        legs: What postures legs take.
         resting: Resting pose.
         rest_sigma: Standard deviation of every hinge about it [rad].
         unseen: Hinges of which hardly any skin is found where it is expected.
@@ -202,8 +218,8 @@ def tracking_priors(
         config: Motion and times.
     """
     surely = spread(awaited.body, belief, hidden, timestamp_s, config.motion, rest_sigma)
-    share = config.prior.unseen_s / belief.step_s(timestamp_s)
+    frames = config.prior.unseen_s / belief.step_s(timestamp_s)
     return [
         gaussian_prior(awaited.q, surely),
-        rest_prior(resting, rest_sigma, unseen, hidden, share),
+        *rest_priors(awaited.body, legs, resting, rest_sigma, awaited.q, unseen, hidden, frames),
     ]

@@ -31,7 +31,7 @@ COMMANDS = {
     "dataset": "Synthetic people in synthetic rooms: build a dataset or look at one.",
     "train": "Train the part segmentation on labelled recordings; a stopped run goes on.",
     "bench": "Measure on held-out people, motions and objects.",
-    "model": "The human itself: build or draw it.",
+    "model": "The human itself: build it, learn its postures, or draw it.",
 }
 """First sentence of each command `name`, which is class `Name` of `kintrack.commands.name`."""
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from kintrack.bounds import check_bounds
 from kintrack.deformation_config import DeformationConfig
 from kintrack.errors import ConfigError
+from kintrack.floor_config import FloorConfig
 from kintrack.objective_config import (
     MotionConfig,
     PriorConfig,
@@ -211,6 +212,8 @@ class TrackerConfig:
     """Covariances."""
     pull: PullConfig = field(default_factory=PullConfig)
     """Places of the parts."""
+    floor: FloorConfig = field(default_factory=FloorConfig)
+    """Feet that are not seen."""
     prior: PriorConfig = field(default_factory=PriorConfig)
     """Pose prior."""
     motion: MotionConfig = field(default_factory=MotionConfig)

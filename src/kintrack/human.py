@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from kintrack.body import Body, load_body
@@ -90,6 +90,12 @@ def _by_hinge(body: Body, trunk: float, twist: float, limb: float) -> Float[ndar
         value = trunk if stem.startswith(_TRUNK) else twist if stem.startswith(_TWIST) else limb
         out[body.dof(joint)] = value
     return out
+
+
+def leg_hinges(body: Body) -> Bool[ndarray, " nv"]:
+    """True for the hinges of hips, knees and ankles."""
+    legs = [n[2:].startswith(("hip", "knee", "ankle")) for n in list(body.model.names)[2:]]
+    return np.array([False] * 6 + legs)
 
 
 def prior_sigma(body: Body, config: PriorConfig) -> Float[ndarray, " nv"]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 from threadpoolctl import ThreadpoolController
 
@@ -16,15 +16,19 @@ from kintrack.belief import Belief
 from kintrack.body import BodyState
 from kintrack.config import TrackerConfig
 from kintrack.deformation.surface import Surface, met
+from kintrack.floor import Ground, soles_of
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid
 from kintrack.human import RESTING_DEG, Human, load_human, posed, prior_sigma
 from kintrack.lifecycle import Life, LifecycleConfig, Reading
 from kintrack.person import LabelledConfig, geometric_lifecycle
 from kintrack.reporting import empty_result
+from kintrack.residuals.contact import Contact
+from kintrack.residuals.pose_prior import load_leg_prior
 from kintrack.result import FrameResult
 from kintrack.rivals import Duel, Vigil
 from kintrack.segmenter import Segmenter, Watched
 from kintrack.sequence.frame import Frame
+from kintrack.skin import skinned_vertices
 from kintrack.whereabouts import Whereabouts
 
 
@@ -62,7 +66,7 @@ class Memory:
         that step's own result is the last of them."""
         self._duel: Duel | None = None
         self._vigil = Vigil(self.config.rival)
-        self._life, self._where = Life(), Whereabouts()
+        self._life, self._where, self._ground = Life(), Whereabouts(), Ground()
         self._failed_s = -np.inf
         self.surface: Surface | None = None
         self._clock = clock
@@ -77,7 +81,9 @@ class Memory:
         if self.surface is not None:
             self.human, self._fitted = self.surface.shown(human), self.surface.fitted(human)
         self._resting = posed(human.body, RESTING_DEG)
+        self._legs = load_leg_prior(human.body, self.config.prior)
         self._prior_sigma = prior_sigma(human.body, self.config.prior)
+        self._soles = soles_of(human)
 
     @property
     def in_doubt(self) -> bool:
@@ -94,7 +100,8 @@ class Memory:
         self.belief, self.reading, self.surface = other.belief, other.reading, other.surface
         self._met, self.human, self._fitted = other._met, other.human, other._fitted
         self._resting, self._prior_sigma = other._resting, other._prior_sigma
-        self._life, self._where = other._life, other._where
+        self._legs = other._legs
+        self._life, self._where, self._soles = other._life, other._where, other._soles
 
     def _lifecycle(self, observation: Observation) -> LifecycleConfig:
         """When tracking begins and ends."""
@@ -106,6 +113,22 @@ class Memory:
         """The skin of a state as the camera sees it."""
         T_camera_world = invert_rigid(self.T_world_camera)
         return view_skin(self._fitted, state, T_camera_world, observation, self.config)
+
+    def _contact(self, lost: Bool[ndarray, " nv"]) -> Contact | None:
+        """The floor under feet of which nothing is seen; None if there is no such foot or floor."""
+        ankles = [self._met.body.dof(f"{side}_ankle_dorsiflexion") for side in "lr"]
+        if self._ground.floor is None or not lost[ankles].any():
+            return None
+        return Contact(self._ground.floor, self._soles[lost[ankles]])
+
+    def _look_down(self, state: BodyState, observation: Observation, now_s: float) -> None:
+        """Look for the floor from time to time."""
+        floor = self.config.floor
+        if self._ground.due(now_s, floor):
+            soles = skinned_vertices(state, self._fitted.skin)[self._soles]
+            self._ground = self._ground.looked(
+                observation, self.T_world_camera, soles, now_s, floor
+            )
 
     def _nothing(
         self, frame: Frame, status: str, began: float, reason: str | None = None

@@ -52,17 +52,24 @@ class PriorConfig:
     """What is known before a frame is seen."""
 
     limb_rad: float = 0.4
-    """Standard deviation of arm and leg hinges about the resting pose [rad]."""
+    """Standard deviation of arm and leg hinges about the resting pose [rad]; of legs, only while
+    nothing is tracked."""
     trunk_rad: float = 0.15
     """Standard deviation of spine, neck, head and clavicle hinges about zero [rad]."""
     twist_rad: float = 0.5
-    """Standard deviation of forearm, wrist and ankle hinges about zero [rad]."""
+    """Standard deviation of forearm, wrist and ankle hinges about zero [rad]; as of legs."""
+    spread: float = 1.5
+    """Factor on the standard deviations of the postures that legs take."""
+    floor_rad: float = 0.1
+    """Standard deviation of every hinge of theirs besides [rad]."""
     unseen_s: float = 2.0
     """Time in which a limb that is not found, though nothing hides it, relaxes towards rest [s]."""
 
     def __post_init__(self) -> None:
         check_bounds(
             self,
+            spread=(0.1, 100),
+            floor_rad=(0.001, 10),
             limb_rad=(0.01, 10),
             trunk_rad=(0.01, 10),
             twist_rad=(0.01, 10),

@@ -93,7 +93,7 @@ class Tracker(Memory):
         elif self.tracks and self._vigil.due(self.reading, frame.timestamp_s):
             told = None if self.segmenter is None else Told(self.segmenter)
             rival = Tracker(self.config, human, T, segmenter=told, labelled=self.labelled)
-            rival._where = self._where
+            rival._where, rival._ground = self._where, self._ground
             self._duel = Duel.between(result, rival, frame, self.config.rival)
         else:
             return result
@@ -133,7 +133,15 @@ class Tracker(Memory):
         unseen = unseen_hinges(self._fitted, expected, seen, config.judge.explained_m)
         hidden = hidden_hinges(self._fitted, expected, seen, config.occlusion)
         priors = tracking_priors(
-            awaited, self.belief, self._resting, self._prior_sigma, unseen, hidden, now_s, config
+            awaited,
+            self.belief,
+            self._legs,
+            self._resting,
+            self._prior_sigma,
+            unseen,
+            hidden,
+            now_s,
+            config,
         )
         gates = np.geomspace(a.first_gate_m, a.last_gate_m, config.solver.rounds).tolist()
         try:
@@ -147,6 +155,7 @@ class Tracker(Memory):
                 gates,
                 self._clock,
                 expected,
+                self._contact(unseen | hidden),
             )
         except AssociationError:
             return self._miss(frame, seen, began)
@@ -219,6 +228,7 @@ class Tracker(Memory):
             new = replace(new, misses=self._life.bad)
             self.belief = new if self._life.tracks else None
         offsets_m = self._deform(fit.state, observation, now_s)
+        self._look_down(fit.state, observation, now_s)
         result = fitted_result(
             frame,
             self._life.status,

@@ -56,14 +56,14 @@ class FitProgress:
 
 
 class StepProgress:
-    """A bar for work of several steps, each with frames done, frames in total and time left."""
+    """A bar for work of several steps, each with what is done, what there is, and time left."""
 
-    def __init__(self) -> None:
+    def __init__(self, unit: str = "frames") -> None:
         self._bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
             MofNCompleteColumn(),
-            TextColumn("frames, left"),
+            TextColumn(f"{unit}, left"),
             TimeRemainingColumn(),
             console=console,
         )

@@ -9,9 +9,11 @@ from typing import Annotated
 
 import tyro
 
-from kintrack.commands.console import console
+from kintrack.commands.console import StepProgress, console
 from kintrack.modelling.build import ModelBuildConfig, build_model
 from kintrack.modelling.pictures import draw_model
+from kintrack.residuals.pose_prior import PRIOR_FILE
+from synthesis.motions.habits import HabitsConfig, learn_habits
 
 
 @dataclass(frozen=True)
@@ -44,11 +46,33 @@ class ModelPictures:
 
 
 @dataclass(frozen=True)
+class ModelPrior:
+    """Learn which postures people take (needs the extra `model`)."""
+
+    output: Path = Path("model")
+    """Folder for pose_prior.npz."""
+    mocap: Path | None = None
+    """Folder of motion capture clips, as cmu_*.npz; authored motions only if not given."""
+    config: Annotated[HabitsConfig, tyro.conf.OmitArgPrefixes] = field(default_factory=HabitsConfig)
+    """Sizes and seed."""
+
+    def run(self) -> None:
+        """Learn it, with progress."""
+        path = self.output / PRIOR_FILE
+        with StepProgress("motions") as progress:
+            learn_habits(
+                path, self.mocap, self.config, lambda done, n: progress("performing", done, n)
+            )
+        console.print(f"written: {path}")
+
+
+@dataclass(frozen=True)
 class Model:
-    """The human itself: build or draw it."""
+    """The human itself: build it, learn its postures, or draw it."""
 
     action: Annotated[
         Annotated[ModelBuild, tyro.conf.subcommand("build")]
+        | Annotated[ModelPrior, tyro.conf.subcommand("prior")]
         | Annotated[ModelPictures, tyro.conf.subcommand("pictures")],
         tyro.conf.OmitSubcommandPrefixes,
         tyro.conf.OmitArgPrefixes,

@@ -132,7 +132,7 @@ def surface_residual(
         skin=skin,
         vertex=vertex,
         points_world=points_world,
-        roots=_roots(n, config.point_weight),
+        roots=plane_roots(n, config.point_weight),
         weights=robust / (config.correlation * scale**2),
         scale_m=scale,
         inliers=int(inlier.sum()),
@@ -167,7 +167,7 @@ def silhouette_residual(
         skin=skin,
         vertex=vertex,
         points_world=points_world,
-        roots=_roots(d / np.maximum(length, 1e-9)[:, None], 0.0),
+        roots=plane_roots(d / np.maximum(length, 1e-9)[:, None], 0.0),
         weights=config.silhouette_weight * robust / (config.correlation * scale**2),
         scale_m=scale,
         inliers=len(vertex),
@@ -175,8 +175,8 @@ def silhouette_residual(
     )
 
 
-def _roots(n: Float[ndarray, "n 3"], alpha: float) -> Float[ndarray, "n 3 3"]:
-    """A_i of the module's equation."""
+def plane_roots(n: Float[ndarray, "n 3"], alpha: float) -> Float[ndarray, "n 3 3"]:
+    """A_i of the module's equation for unit normals n_i."""
     return _fill_roots(n, np.sqrt(alpha), np.sqrt(1 + alpha) - np.sqrt(alpha))
 
 

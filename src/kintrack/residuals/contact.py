@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Feet that are not seen stand on the floor: below it hardly ever, above it while they step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from kintrack.floor import Floor
+from kintrack.floor_config import FloorConfig
+from kintrack.residuals.surface import SurfaceResidual, plane_roots
+from kintrack.skin import Skin
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The floor, and what should stand on it."""
+
+    floor: Floor
+    """The floor."""
+    soles: Int[ndarray, "f s"]
+    """Vertices under each foot that is not seen."""
+
+
+def contact_residual(
+    skin: Skin, contact: Contact, vertices_world: Float[ndarray, "v 3"], config: FloorConfig
+) -> SurfaceResidual:
+    """Pairs of soles with the floor below or above them, along its normal, Huber weights frozen.
+
+    With height a_i of S vertices under a foot, w_i = min(1, far / |a_i|) / (S sigma^2); sigma is
+    smaller below the floor than above it.
+
+    Args:
+        skin: The skin.
+        contact: The floor, and soles.
+        vertices_world: All vertices now [m].
+        config: Deviations.
+
+    Returns:
+        The term, possibly without pairs.
+    """
+    vertex = contact.soles.ravel()
+    points = vertices_world[vertex]
+    above = contact.floor.above_m(points)
+    normal = contact.floor.normal
+    sigma = np.where(above < 0, config.below_m, config.above_m)
+    robust = np.minimum(1.0, config.far_m / np.maximum(np.abs(above), 1e-9))
+    return SurfaceResidual(
+        skin=skin,
+        vertex=vertex,
+        points_world=points - above[:, None] * normal,
+        roots=plane_roots(np.tile(normal, (len(vertex), 1)), 0.0),
+        weights=robust / (max(contact.soles.shape[-1], 1) * sigma**2),
+        scale_m=config.above_m,
+        inliers=len(vertex),
+        rms_m=float("nan"),
+    )
