@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from kintrack.body import Body, BodyState, run_kinematics
 from kintrack.config import TrackerConfig
-from kintrack.human import leg_hinges, motion_sigma
+from kintrack.human import motion_sigma
 from kintrack.objective_config import MotionConfig
 from kintrack.residuals.pose_prior import LegPrior
 from kintrack.residuals.prior import TangentPrior, diagonal_prior, gaussian_prior
@@ -107,7 +107,6 @@ def spread(
 
 
 def rest_priors(
-    body: Body,
     legs: LegPrior,
     resting: Float[ndarray, " nq"],
     sigma: Float[ndarray, " nv"],
@@ -116,13 +115,12 @@ def rest_priors(
     hidden: Bool[ndarray, " nv"],
     frames: float,
 ) -> list[TangentPrior]:
-    """Legs towards the postures they take, all else towards rest; slowly what is not found.
+    """Towards rest, slowly what is not found; hidden legs towards the postures that legs take.
 
-    Hidden legs are held, too, since they carry the body and go with it. A hidden arm may do
-    anything: it is left to its habit.
+    Legs carry the body and go with it: once a hinge of them is hidden, the mixture holds both. A
+    hidden arm may do anything: it is left to its habit.
 
     Args:
-        body: The body.
         legs: What postures legs take.
         resting: Posture at rest.
         sigma: Standard deviation of every hinge about it [rad].
@@ -132,9 +130,10 @@ def rest_priors(
         frames: In so many frames a limb that is not found relaxes.
     """
     slowly = np.where(unseen, np.sqrt(max(frames, 1.0)), 1.0)
-    if not (hidden & leg_hinges(body)).any():
+    if not hidden[legs.hinges].any():
         return [diagonal_prior(resting, np.where(hidden, np.inf, slowly * sigma))]
-    free = hidden | leg_hinges(body)
+    free = hidden.copy()
+    free[legs.hinges] = True
     held = diagonal_prior(resting, np.where(free, np.inf, slowly * sigma))
     return [legs.near(q, np.where(hidden, 1.0, slowly)), held]
 
@@ -221,5 +220,5 @@ def tracking_priors(
     frames = config.prior.unseen_s / belief.step_s(timestamp_s)
     return [
         gaussian_prior(awaited.q, surely),
-        *rest_priors(awaited.body, legs, resting, rest_sigma, awaited.q, unseen, hidden, frames),
+        *rest_priors(legs, resting, rest_sigma, awaited.q, unseen, hidden, frames),
     ]

@@ -52,14 +52,13 @@ class PriorConfig:
     """What is known before a frame is seen."""
 
     limb_rad: float = 0.4
-    """Standard deviation of arm and leg hinges about the resting pose [rad]; of legs, only while
-    nothing is tracked."""
+    """Standard deviation of arm and leg hinges about the resting pose [rad]."""
     trunk_rad: float = 0.15
     """Standard deviation of spine, neck, head and clavicle hinges about zero [rad]."""
     twist_rad: float = 0.5
-    """Standard deviation of forearm, wrist and ankle hinges about zero [rad]; as of legs."""
+    """Standard deviation of forearm, wrist and ankle hinges about zero [rad]."""
     spread: float = 1.5
-    """Factor on the standard deviations of the postures that legs take."""
+    """Factor on the standard deviations of the postures that legs take, while one is hidden."""
     floor_rad: float = 0.1
     """Standard deviation of every hinge of theirs besides [rad]."""
     unseen_s: float = 2.0

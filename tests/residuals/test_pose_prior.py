@@ -88,7 +88,6 @@ def test_hidden_legs_are_held_hidden_arms_are_not_and_what_is_not_found_softly(b
 
     def held(hinge, unseen, hidden):
         terms = rest_priors(
-            body,
             prior,
             posed(body, RESTING_DEG),
             prior_sigma(body, CONFIG),

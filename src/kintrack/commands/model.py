@@ -47,7 +47,7 @@ class ModelPictures:
 
 @dataclass(frozen=True)
 class ModelPrior:
-    """Learn which postures people take (needs the extra `model`)."""
+    """Learn which postures legs take (needs the extra `model`)."""
 
     output: Path = Path("model")
     """Folder for pose_prior.npz."""

@@ -40,7 +40,7 @@ def contact_residual(
         config: Deviations.
 
     Returns:
-        The term, possibly without pairs.
+        The term.
     """
     vertex = contact.soles.ravel()
     points = vertices_world[vertex]
@@ -53,7 +53,7 @@ def contact_residual(
         vertex=vertex,
         points_world=points - above[:, None] * normal,
         roots=plane_roots(np.tile(normal, (len(vertex), 1)), 0.0),
-        weights=robust / (max(contact.soles.shape[-1], 1) * sigma**2),
+        weights=robust / (contact.soles.shape[-1] * sigma**2),
         scale_m=config.above_m,
         inliers=len(vertex),
         rms_m=float("nan"),
