@@ -62,9 +62,9 @@ class Memory:
         self.reading: Reading | None = None
         """What the last frame said of the track; None if it was compared with nothing."""
         self.amended: tuple[FrameResult, ...] = ()
-        """What the last frames should have been, if the last step found its track turned round;
-        that step's own result is the last of them."""
-        self._duel: Duel | None = None
+        """What the last frames should have been, if the last step found sides exchanged; that
+        step's own result is the last of them."""
+        self._duels: list[Duel] = []
         self._vigil = Vigil(self.config.rival)
         self._life, self._where, self._ground = Life(), Whereabouts(), Ground()
         self._failed_s = -np.inf
@@ -88,7 +88,7 @@ class Memory:
     @property
     def in_doubt(self) -> bool:
         """Whether the last results may still be `amended`."""
-        return self._duel is not None
+        return bool(self._duels)
 
     @property
     def tracks(self) -> bool:

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A track and its rival, who stands in the same place and faces the other way.
+"""A track and its rivals: who faces the other way, and who stands on exchanged legs.
 
 Front and back of a person look alike for one frame: a start that takes one for the other puts every
-left joint where the right one is, and so does a track that loses somebody who turns. Whoever is
-followed with the wrong side forward is followed worse from frame to frame, since trunk, knees,
-elbows and feet bend and bulge the other way. So both are followed for some frames, by the same
-labels, and the one whose skin fits better stays: when a track begins, and when it becomes doubtful.
+left joint where the right one is, and so does a track that loses somebody who turns. The legs of
+somebody in profile are exchanged as easily. Whoever is followed with a wrong side is followed worse
+from frame to frame, since trunk, knees, elbows and feet bend and bulge the other way, and crossed
+legs end beside the feet that are seen. So all are followed for some frames, by the same labels, and
+the one whose skin fits best stays: when a track begins, and when it becomes doubtful.
 """
 
 from __future__ import annotations
@@ -29,6 +30,37 @@ if TYPE_CHECKING:
     from kintrack.tracker import Tracker
 
 OTHER_SIDE = {"l": "r", "r": "l"}
+BELOW_HIP = ("knee", "ankle", "foot")
+
+
+class Challenge(NamedTuple):
+    """Where a rival stands, and by how much he must be better."""
+
+    joints_camera: Float[ndarray, "j 3"]
+    """His joints [m], order of `JOINT_NAMES`."""
+    wins: float
+    """He stays if his doubt is smaller than the track's by this factor."""
+    wins_late: float
+    """The same once the duel is over."""
+
+
+def challenges(result: FrameResult, config: RivalConfig) -> list[Challenge]:
+    """Who else could stand where somebody has been found.
+
+    Args:
+        result: Pose and what was seen of it.
+        config: By how much they must be better.
+
+    Returns:
+        Somebody who faces the other way and, unless one of the legs is not seen at all, somebody
+        whose legs are exchanged.
+    """
+    joints, seen = result.joint_positions_camera_m, result.joint_visible
+    found = [Challenge(turned_round(joints), config.wins, config.wins_late)]
+    legs = [[JOINT_NAMES.index(f"{side}_{name}") for name in BELOW_HIP] for side in "lr"]
+    if all(seen[leg].max() >= config.legs_seen for leg in legs):
+        found.append(Challenge(crossed_legs(joints), config.legs_win, config.legs_win))
+    return found
 
 
 class Verdict(NamedTuple):
@@ -36,7 +68,7 @@ class Verdict(NamedTuple):
 
     over: bool
     """Whether it is decided, or has lasted long enough."""
-    turned: bool = False
+    won: bool = False
     """Whether the rival stays."""
 
 
@@ -45,6 +77,7 @@ class Duel:
     """Both tracks of one person since the frame in which the rival began."""
 
     rival: Tracker
+    challenge: Challenge
     config: RivalConfig
     results: list[FrameResult]
     """The rival's, from that frame on."""
@@ -52,25 +85,25 @@ class Duel:
     """Of the track and of the rival in every frame in which both could be judged [m^2]."""
 
     @classmethod
-    def between(
-        cls, result: FrameResult, rival: Tracker, frame: Frame, config: RivalConfig
+    def begun(
+        cls, rival: Tracker, challenge: Challenge, frame: Frame, config: RivalConfig
     ) -> Duel | None:
-        """Let a rival begin where a track is.
+        """Let a rival begin.
 
         Args:
-            result: The track's, of the frame.
             rival: A tracker that has seen nothing.
-            frame: The frame.
+            challenge: Where he stands.
+            frame: The frame in which he does.
             config: How long, and who wins.
 
         Returns:
-            The duel; None if nobody can stand there the other way round.
+            The duel; None if nobody can stand there.
         """
         try:
-            first = rival.begin(frame, turned_round(result.joint_positions_camera_m))
+            first = rival.begin(frame, challenge.joints_camera)
         except KintrackError:
             return None
-        return cls(rival, config, [first], []) if rival.tracks else None
+        return cls(rival, challenge, config, [first], []) if rival.tracks else None
 
     def step(self, frame: Frame, tracks: bool, reading: Reading | None) -> Verdict:
         """Let the rival take the frame that the track has just taken.
@@ -86,17 +119,22 @@ class Duel:
             return Verdict(True, self.rival.tracks and self._ahead())
         if reading is not None and other is not None:
             self.doubts_m2.append((doubt_m2(reading, c), doubt_m2(other, c)))
-        late = len(self.results) > c.most_frames
-        if len(self.doubts_m2) < c.least_frames:
-            return Verdict(late)
-        if self._ahead(c.wins_late if late else c.wins):
+        late, judged = len(self.results) > c.most_frames, len(self.doubts_m2)
+        if judged < c.least_frames:
+            return Verdict(late or (judged >= c.early_frames and not self._ahead(c.loses_early)))
+        if self._ahead(self.challenge.wins_late if late else self.challenge.wins):
             return Verdict(True, True)
         return Verdict(late or not self._ahead(c.loses))
 
+    @property
+    def advantage(self) -> float:
+        """The track's doubt over the rival's; 1 before any frame could be judged."""
+        own, others = np.sum(self.doubts_m2, axis=0) if self.doubts_m2 else (1.0, 1.0)
+        return float(own / others)
+
     def _ahead(self, factor: float = 1.0) -> bool:
         """Whether the rival's doubt is smaller than so many times the track's."""
-        own, others = np.sum(self.doubts_m2, axis=0) if self.doubts_m2 else (0.0, 0.0)
-        return bool(others < factor * own)
+        return bool(self.doubts_m2) and factor * self.advantage > 1.0
 
 
 class Vigil:
@@ -147,5 +185,18 @@ def turned_round(joints: Float[ndarray, "j 3"]) -> Float[ndarray, "j 3"]:
     Args:
         joints: One row per joint, order of `JOINT_NAMES`.
     """
-    names = [OTHER_SIDE[n[0]] + n[1:] if n[1] == "_" else n for n in JOINT_NAMES]
+    return _with_sides_swapped(joints, [name for name in JOINT_NAMES if name[1] == "_"])
+
+
+def crossed_legs(joints: Float[ndarray, "j 3"]) -> Float[ndarray, "j 3"]:
+    """The joints of somebody whose left leg is where the right one is, hips and the rest kept.
+
+    Args:
+        joints: One row per joint, order of `JOINT_NAMES`.
+    """
+    return _with_sides_swapped(joints, [f"{side}_{name}" for side in "lr" for name in BELOW_HIP])
+
+
+def _with_sides_swapped(joints: Float[ndarray, "j 3"], which: list[str]) -> Float[ndarray, "j 3"]:
+    names = [OTHER_SIDE[n[0]] + n[1:] if n in which else n for n in JOINT_NAMES]
     return joints[[JOINT_NAMES.index(name) for name in names]]

@@ -27,7 +27,7 @@ from kintrack.person import own_pixels, part_pull
 from kintrack.reporting import coasted_result, fitted_result, reading_of
 from kintrack.residuals.prior import TangentPrior, diagonal_prior
 from kintrack.result import FrameResult
-from kintrack.rivals import Duel, Verdict, Vigil
+from kintrack.rivals import Duel, Vigil, challenges
 from kintrack.segmenter import Told, checked_labels, region_of
 from kintrack.sequence.frame import Frame
 from kintrack.settling import settle
@@ -46,8 +46,8 @@ class Tracker(Memory):
 
         Returns:
             Pose, joints, covariances and status. Whoever begins to be tracked, or is doubtful, is
-            followed facing the other way, too, for some frames; if that fits better, it is what is
-            returned, and `amended` has the frames before.
+            followed facing the other way and on exchanged legs, too, for some frames; if that fits
+            better, it is what is returned, and `amended` has the frames before.
         """
         with self._threads.limit(limits=1, user_api="blas"):
             if not self.tracks:
@@ -79,33 +79,44 @@ class Tracker(Memory):
                 found = begin(human, seen, joints_camera, T, self.config)
             except AssociationError:
                 return self._nothing(frame, "initialising", began)
-            self.belief, self._life, self._duel = None, Life("tracking", None), None
+            self.belief, self._life, self._duels = None, Life("tracking", None), []
             self._vigil = Vigil(self.config.rival, trusted=True)
             person, sized_start = in_own_size(human, found, T, self.config)
             return self._meet_at(frame, person, sized_start or found, began)
 
     def _settled(self, frame: Frame, result: FrameResult) -> FrameResult:
-        """The frame's result, or the rival's if he stays."""
-        began, human, T = time.perf_counter(), self._met, self.T_world_camera
-        verdict = Verdict(over=False)
-        if self._duel is not None:
-            verdict = self._duel.step(frame, self.tracks, self.reading)
+        """The frame's result, or that of a rival who stays."""
+        began, winner = time.perf_counter(), None
+        if self._duels:
+            told = [(duel, duel.step(frame, self.tracks, self.reading)) for duel in self._duels]
+            won = [duel for duel, verdict in told if verdict.won]
+            winner = max(won, key=lambda duel: duel.advantage, default=None)
+            self._duels = [] if won else [duel for duel, verdict in told if not verdict.over]
         elif self.tracks and self._vigil.due(self.reading, frame.timestamp_s):
-            told = None if self.segmenter is None else Told(self.segmenter)
-            rival = Tracker(self.config, human, T, segmenter=told, labelled=self.labelled)
-            rival._where, rival._ground = self._where, self._ground
-            self._duel = Duel.between(result, rival, frame, self.config.rival)
+            self._duels = self._challenged(frame, result)
         else:
             return result
         self._clock("rival")
-        both_ms = result.milliseconds + 1e3 * (time.perf_counter() - began)
-        if self._duel is not None:
-            self._duel.results[-1] = replace(self._duel.results[-1], milliseconds=both_ms)
-            if verdict.turned:
-                self._become(self._duel.rival)
-                self.amended = tuple(self._duel.results)
-            self._duel = None if verdict.over else self._duel
-        return self.amended[-1] if verdict.turned else replace(result, milliseconds=both_ms)
+        all_ms = result.milliseconds + 1e3 * (time.perf_counter() - began)
+        for duel in self._duels if winner is None else [winner]:
+            duel.results[-1] = replace(duel.results[-1], milliseconds=all_ms)
+        if winner is None:
+            return replace(result, milliseconds=all_ms)
+        self._become(winner.rival)
+        self.amended = tuple(winner.results)
+        return self.amended[-1]
+
+    def _challenged(self, frame: Frame, result: FrameResult) -> list[Duel]:
+        """Let rivals, who have none themselves, begin where the track is."""
+        rules, duels = self.config.rival, []
+        alone = replace(self.config, rival=replace(rules, most_frames=0))
+        for challenge in challenges(result, rules):
+            told = None if self.segmenter is None else Told(self.segmenter)
+            human, T = self._met, self.T_world_camera
+            rival = Tracker(alone, human, T, segmenter=told, labelled=self.labelled)
+            rival._where, rival._ground = self._where, self._ground
+            duels.append(Duel.begun(rival, challenge, frame, rules))
+        return [duel for duel in duels if duel is not None]
 
     def _step(self, frame: Frame) -> FrameResult:
         began, self.reading = time.perf_counter(), None

@@ -4,7 +4,7 @@
 Data are made, networks trained one after the other in out/training/; a stopped run goes on.
 
     python tests/benchmarks/training.py ship
-    python tests/benchmarks/training.py compare --steps 20000 --processes 2
+    python tests/benchmarks/training.py compare --steps 20000 --prepared 100000
 
 `compare` trains Fast-FCN, U-Net and VGG-FCN, Fast-FCN without inserted objects, and with other
 weights of the background modifier, all on the same data and for as many steps, and writes
@@ -42,7 +42,7 @@ WIDTHS = {
     "vgg_fcn": "64 128 256 512 512",
 }
 QUICK_WIDTHS = {"fast_fcn": "4 4 8 8", "unet": "4 4 8 8 8", "vgg_fcn": "4 4 8 8 8"}
-LAMBDAS = (0.0, 0.25, 1.0)
+LAMBDAS = (0.0, 1.0)
 """Weights of the background modifier, beside the usual 0.5."""
 FIGURE = "training.png"
 COLUMNS = ("pixel_accuracy", "background_iou", "non_background_iou", "person_iou", "mean_part_iou")
@@ -77,7 +77,9 @@ def main() -> int:
     if not arguments.sets:
         frames = QUICK_FRAMES if arguments.quick else arguments.frames
         _build(folder, arguments.data, frames, arguments.quick)
-    shared = ["--batch", str(arguments.batch), "--seed", str(arguments.seed)]
+    shared = ["--batch", str(arguments.batch), "--seed", str(arguments.seed),
+              "--prepared", str(arguments.prepared), "--workers", str(arguments.workers)]  # fmt: skip
+    shared += ["--rate", str(arguments.rate)]
     if arguments.what == "ship":
         length = ["--steps", "4"] if arguments.quick else ["--hours", str(arguments.hours)]
         made = _train(folder, Recipe("ship", SHIPPED), [*shared, *length], arguments)
@@ -110,6 +112,9 @@ def _arguments() -> argparse.Namespace:
     made.add_argument("--hours", type=float, default=2.5, help="length of `ship`")
     made.add_argument("--steps", type=int, default=20_000, help="length of each of `compare`")
     made.add_argument("--batch", type=int, default=16)
+    made.add_argument("--rate", type=float, default=2e-3, help="highest learning rate")
+    made.add_argument("--prepared", type=int, default=0, help="samples made once, for all runs")
+    made.add_argument("--workers", type=int, default=1, help="processes that make samples")
     made.add_argument("--seed", type=int, default=0)
     made.add_argument("--processes", type=int, default=1, help="one for each core or GPU")
     made.add_argument("--quick", action="store_true", help="tiny networks; docs/ is left as it is")
