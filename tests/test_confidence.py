@@ -14,6 +14,7 @@ from kintrack.skin import skinned_vertices, vertex_jacobians, vertex_normals
 from kintrack.solver.gauss_newton import normal_equations
 
 KNEE = JOINT_NAMES.index("l_knee")
+SEEN = np.ones(len(JOINT_NAMES))
 
 
 @pytest.fixture(scope="module")
@@ -34,14 +35,28 @@ def problem(human, scene):
 def test_without_shared_error_and_floor_it_is_the_solvers_own_covariance(problem):
     state, covariance, surface = problem
     J = joint_jacobians(state)
-    found = joint_covariances(state, covariance, surface, ConfidenceConfig(0.0, 0.0))
+    found = joint_covariances(state, covariance, surface, SEEN, ConfidenceConfig(0.0, 0.0))
     assert np.allclose(found, J @ covariance @ J.transpose(0, 2, 1))
 
 
 def test_the_floor_is_added_along_every_axis(problem):
-    bare = joint_covariances(*problem, ConfidenceConfig(0.0, 0.0))
-    assert np.allclose(joint_covariances(*problem, ConfidenceConfig(0.0, 0.02)) - bare,
-                       4e-4 * np.eye(3))  # fmt: skip
+    bare = joint_covariances(*problem, SEEN, ConfidenceConfig(0.0, 0.0))
+    floored = joint_covariances(*problem, SEEN, ConfidenceConfig(0.0, 0.02))
+    assert np.allclose(floored - bare, 4e-4 * np.eye(3))
+
+
+def test_a_joint_is_as_much_farther_off_as_less_of_it_is_seen(problem):
+    config = ConfidenceConfig(unseen=3.0)
+    seen = joint_covariances(*problem, SEEN, config)
+    assert np.allclose(joint_covariances(*problem, 0 * SEEN, config), 9.0 * seen)
+    assert np.allclose(joint_covariances(*problem, 0.5 * SEEN, config), 4.0 * seen)
+
+
+def test_a_prediction_has_no_shared_error(problem):
+    state, covariance, _ = problem
+    J = joint_jacobians(state)
+    found = joint_covariances(state, covariance, None, SEEN, ConfidenceConfig(0.5, 0.0))
+    assert np.allclose(found, J @ covariance @ J.transpose(0, 2, 1))
 
 
 def test_the_shared_error_is_what_shifting_the_points_of_each_link_does(problem, human):
@@ -59,6 +74,6 @@ def test_the_shared_error_is_what_shifting_the_points_of_each_link_does(problem,
     moved = np.einsum("dli,lik->dk", shifts, gradient) @ covariance
     knees = moved @ joint_jacobians(state)[KNEE].T
     config = ConfidenceConfig(sigma, 0.0)
-    own = joint_covariances(state, covariance, surface, ConfidenceConfig(0.0, 0.0))[KNEE]
-    found = joint_covariances(state, covariance, surface, config)[KNEE] - own
+    own = joint_covariances(state, covariance, surface, SEEN, ConfidenceConfig(0.0, 0.0))[KNEE]
+    found = joint_covariances(state, covariance, surface, SEEN, config)[KNEE] - own
     assert np.allclose(np.cov(knees.T), found, atol=0.1 * np.trace(found))

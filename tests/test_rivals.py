@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A start that takes back for front is found out, and what was said of it is amended."""
+"""A start that exchanges sides is found out, and what was said of it is amended."""
 
 from dataclasses import replace
 
@@ -14,10 +14,11 @@ from kintrack.errors import ConfigError
 from kintrack.fit import fit_sequence
 from kintrack.joints import JOINT_NAMES
 from kintrack.rival_config import RivalConfig
-from kintrack.rivals import turned_round
+from kintrack.rivals import challenges, crossed_legs, turned_round
 from kintrack.tracker import Tracker
 
 FRAMES = 24
+LEGS = [JOINT_NAMES.index(f"{side}_{name}") for side in "lr" for name in ("knee", "ankle", "foot")]
 
 
 def pose(scene, index):
@@ -69,6 +70,51 @@ def test_a_track_that_began_back_to_front_is_turned_and_amended(scene, movie, un
     assert [r.timestamp_s for r in better] == [frame.timestamp_s for frame in movie[: len(better)]]
     assert errors(scene, results[:-1]).mean() > 0.15
     assert errors(scene, better).mean() < 0.03
+
+
+def striding(scene, index):
+    """In profile, the right leg before the left one and farther from the camera."""
+    stride = {"r_hip_flexion": 15, "l_hip_flexion": -10, "knee_flexion": 10}
+    return scene.place(stride | {"elbow_flexion": 30 + 2 * index}, heading_deg=80)
+
+
+def test_crossing_legs_leaves_hips_and_arms_alone_and_twice_is_nothing(scene):
+    joints = scene.joints(striding(scene, 0))
+    crossed = crossed_legs(joints)
+    moved = {JOINT_NAMES[j] for j in np.flatnonzero((crossed != joints).any(axis=1))}
+    assert moved == {f"{side}_{name}" for side in "lr" for name in ("knee", "ankle", "foot")}
+    assert (crossed_legs(crossed) == joints).all()
+
+
+def test_a_track_that_began_on_exchanged_legs_is_put_right_and_amended(scene, unsized, monkeypatch):
+    movie = [scene.frame(scene.depth(striding(scene, i)), i) for i in range(FRAMES)]
+    wrong = crossed_legs(scene.joints(striding(scene, 0)))
+
+    def found(human, observation, T_world_camera, config, labelled):
+        return begin(human, observation, wrong, T_world_camera, config)
+
+    def off(result, index):
+        joints = result.joint_positions_camera_m
+        return scene.errors(striding(scene, index), joints)[LEGS].mean()
+
+    monkeypatch.setattr(kintrack.tracker, "found_by", found)
+    lenient = replace(unsized.judge, start_explained=0.5, min_explained=0.5)
+    tracker, results = Tracker(replace(unsized, judge=lenient)), []
+    for frame in movie:
+        results.append(tracker.step(frame))
+        if not tracker.in_doubt:
+            break
+    assert off(results[0], 0) > 0.12
+    assert len(tracker.amended) == len(results)
+    assert max(off(result, i) for i, result in enumerate(tracker.amended)) < 0.05
+
+
+def test_legs_of_which_one_is_not_seen_are_not_exchanged(scene, movie, unsized):
+    result = Tracker(unsized).step(movie[0])
+    assert len(challenges(result, unsized.rival)) == 2
+    seen = result.joint_visible.copy()
+    seen[[JOINT_NAMES.index(f"r_{name}") for name in ("knee", "ankle", "foot")]] = 0.0
+    assert len(challenges(replace(result, joint_visible=seen), unsized.rival)) == 1
 
 
 def test_a_new_start_from_joints_ends_a_duel(scene, movie, unsized, mistaken):
@@ -127,7 +173,15 @@ def test_a_frame_that_cannot_be_read_decides_nothing(scene, movie, unsized, mist
 
 
 @pytest.mark.parametrize(
-    "values", [{"wins": 1.5}, {"loses": 0.5}, {"most_frames": -1}, {"least_frames": 0}]
+    "values",
+    [
+        {"wins": 1.5},
+        {"legs_win": -1},
+        {"loses_early": 0.9},
+        {"loses": 0.5},
+        {"most_frames": -1},
+        {"least_frames": 0},
+    ],
 )
 def test_numbers_that_make_no_sense_are_refused(values):
     with pytest.raises(ConfigError, match=f"RivalConfig.{next(iter(values))}"):

@@ -10,6 +10,7 @@ from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_poin
 from kintrack.joints import JOINT_NAMES
 from kintrack.lifecycle import NOBODY
 from kintrack.raster import rasterise
+from kintrack.rival_config import RivalConfig
 from kintrack.skin import skinned_vertices
 from kintrack.start import found_by
 from kintrack.tracker import Tracker
@@ -215,7 +216,7 @@ def test_a_gap_in_time_is_survived(scene, movie, after):
 def test_stages_are_reported_for_benchmarks(again, stages):
     assert stages.count("start") == 1
     assert stages.count("observe") == stages.count("report") - 1 == len(again) - 1
-    assert stages.count("rival") == len(again) and stages[-1] == "rival"
+    assert stages.count("rival") == 1 + RivalConfig().early_frames  # hopeless after so many
     assert {"skin", "associate", "solve"} <= set(stages)
 
 

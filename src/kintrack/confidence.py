@@ -6,7 +6,11 @@ are not: clothes and a body of another size shift them all. With a shift b_l of 
 `shared_m` per link and axis, the solution moves by H^-1 G_l b_l, G_l = sum_i w_i J_i^T A_i^T A_i,
 so (the sandwich of Huber 1967)
 
-    C = H^-1 + shared^2 sum_l (H^-1 G_l) (H^-1 G_l)^T,    C_joint = J C J^T + floor^2 I.
+    C = H^-1 + shared^2 sum_l (H^-1 G_l) (H^-1 G_l)^T,    C_joint = s^2 (J C J^T + floor^2 I).
+
+Neither knows that a limb of which little is seen may have been given the wrong pixels, or none. So
+a joint around which the share v of the skin is seen is taken to be s = v + (1 - v) unseen times as
+far off.
 """
 
 from __future__ import annotations
@@ -24,7 +28,8 @@ from kintrack.residuals.surface import SurfaceResidual
 def joint_covariances(
     state: BodyState,
     covariance: Float[ndarray, "nv nv"],
-    surface: SurfaceResidual,
+    surface: SurfaceResidual | None,
+    visible: Float[ndarray, " j"],
     config: ConfidenceConfig,
 ) -> Float[ndarray, "j 3 3"]:
     """Covariances of the joint centres, world frame.
@@ -32,16 +37,20 @@ def joint_covariances(
     Args:
         state: Body at the solution.
         covariance: Inverse of the solver's matrix there.
-        surface: Pairs of the last round.
-        config: Shared error and floor.
+        surface: Pairs of the last round; None if the pose is a prediction.
+        visible: Share of the skin near each joint that was seen, 0 to 1.
+        config: Shared error, floor, and what is unseen.
 
     Returns:
         Covariances [m^2], shape (J, 3, 3).
     """
-    shift = covariance @ _shared_gradients(state, surface)
-    whole = covariance + config.shared_m**2 * (shift @ shift.T)
+    if surface is not None:
+        shift = covariance @ _shared_gradients(state, surface)
+        covariance = covariance + config.shared_m**2 * (shift @ shift.T)
     J = joint_jacobians(state)
-    return J @ whole @ J.transpose(0, 2, 1) + config.floor_m**2 * np.eye(3)
+    known = J @ covariance @ J.transpose(0, 2, 1) + config.floor_m**2 * np.eye(3)
+    scale = visible + (1.0 - visible) * config.unseen
+    return scale[:, None, None] ** 2 * known
 
 
 def _shared_gradients(state: BodyState, surface: SurfaceResidual) -> Float[ndarray, "nv m"]:

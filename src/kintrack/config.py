@@ -100,9 +100,11 @@ class ConfidenceConfig:
     """Standard deviation of the error that all pairs of a link share: clothes, template [m]."""
     floor_m: float = 0.025
     """Standard deviation of a joint centre within a body that fits perfectly [m]."""
+    unseen: float = 2.0
+    """How many times as far off a joint is of which nothing is seen."""
 
     def __post_init__(self) -> None:
-        check_bounds(self, shared_m=(0.0, 1.0), floor_m=(0.0, 1.0))
+        check_bounds(self, shared_m=(0.0, 1.0), floor_m=(0.0, 1.0), unseen=(1.0, 100.0))
 
 
 SOLVER_METHODS = ("gauss-newton", "ipopt")

@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from kintrack.alignment import Fit, View
 from kintrack.association.observation import Observation
-from kintrack.body import Body, BodyState, joint_jacobians
+from kintrack.body import Body, BodyState
 from kintrack.confidence import joint_covariances
 from kintrack.config import ConfidenceConfig
 from kintrack.geometry import transform_points
@@ -75,14 +75,15 @@ def fitted_result(
     """
     R = T_camera_world[:3, :3]
     positions = transform_points(T_camera_world, fit.state.joint_positions_world)
-    covariances = joint_covariances(fit.state, covariance, fit.surface, config)
+    visible = joint_visibility(view, supported, positions)
+    covariances = joint_covariances(fit.state, covariance, fit.surface, visible, config)
     return FrameResult(
         timestamp_s=frame.timestamp_s,
         status=status,
         q=fit.state.q,
         joint_positions_camera_m=positions,
         joint_covariances_m2=R @ covariances @ R.T,
-        joint_visible=joint_visibility(view, supported, positions),
+        joint_visible=visible,
         residual_rms_m=fit.surface.rms_m,
         inliers=fit.surface.inliers,
         milliseconds=1e3 * (time.perf_counter() - began_s),
@@ -109,14 +110,13 @@ def coasted_result(
         began_s: `time.perf_counter()` when the frame came.
     """
     nothing = empty_result(frame, state.body, "tracking", began_s)
-    R, J = T_camera_world[:3, :3], joint_jacobians(state)
+    R = T_camera_world[:3, :3]
     nothing.q[:] = state.q
     nothing.joint_positions_camera_m[:] = transform_points(
         T_camera_world, state.joint_positions_world
     )
-    nothing.joint_covariances_m2[:] = R @ (
-        J @ covariance @ J.transpose(0, 2, 1)
-    ) @ R.T + config.floor_m**2 * np.eye(3)
+    covariances = joint_covariances(state, covariance, None, nothing.joint_visible, config)
+    nothing.joint_covariances_m2[:] = R @ covariances @ R.T
     return nothing
 
 

@@ -116,7 +116,7 @@ class Duel:
         self.results.append(self.rival.step(frame))
         other, c = self.rival.reading, self.config
         if not (tracks and self.rival.tracks):
-            return Verdict(True, self.rival.tracks and self._ahead())
+            return Verdict(True, self.rival.tracks and self._ahead(self.challenge.wins_late))
         if reading is not None and other is not None:
             self.doubts_m2.append((doubt_m2(reading, c), doubt_m2(other, c)))
         late, judged = len(self.results) > c.most_frames, len(self.doubts_m2)

@@ -57,6 +57,14 @@ def test_an_empty_pixel_says_nothing_where_there_is_a_background(column):
     assert len(pairs(replace(column, has_background=True), vertex_at(60, 25)).vertex) == 0
 
 
+def test_dark_cloth_without_readings_may_be_where_skin_belongs(column):
+    points = column.points_camera.copy()
+    points[:, 55:] = CAMERA.back_project(np.full((60, 80), 4.0))[:, 55:]
+    room = replace(column, points_camera=points, has_background=True)
+    found = pairs(room, vertex_at(60, 25))
+    assert np.allclose(found.points_camera, vertex_at(54, 25))
+
+
 @pytest.mark.parametrize(("depth_m", "count"), [(3.0, 1), (1.0, 0)])
 def test_only_a_pixel_that_looks_past_the_vertex_is_evidence(column, depth_m, count):
     depth = column.points_camera[..., 2].copy()

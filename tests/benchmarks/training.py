@@ -77,9 +77,9 @@ def main() -> int:
     if not arguments.sets:
         frames = QUICK_FRAMES if arguments.quick else arguments.frames
         _build(folder, arguments.data, frames, arguments.quick)
-    shared = ["--batch", str(arguments.batch), "--seed", str(arguments.seed),
-              "--prepared", str(arguments.prepared), "--workers", str(arguments.workers)]  # fmt: skip
-    shared += ["--rate", str(arguments.rate)]
+    shared = ["--batch", str(arguments.batch), "--rate", str(arguments.rate)]
+    shared += ["--prepared", str(arguments.prepared), "--workers", str(arguments.workers)]
+    shared += ["--seed", str(arguments.seed)]
     if arguments.what == "ship":
         length = ["--steps", "4"] if arguments.quick else ["--hours", str(arguments.hours)]
         made = _train(folder, Recipe("ship", SHIPPED), [*shared, *length], arguments)

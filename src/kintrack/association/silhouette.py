@@ -38,10 +38,15 @@ class Silhouette(NamedTuple):
 
 
 def silhouette(observation: Observation) -> Silhouette:
-    """Distance transform of where the person may be: the region, and behind anything nearer."""
+    """Distance transform of where the person may be.
+
+    That is the region, behind anything nearer, and where a recorded room has no reading, as dark
+    cloth has none.
+    """
     z = observation.points_camera[..., 2]
     nearest = np.quantile(z[observation.region], 0.01) if observation.region.any() else 0.0
-    allowed = observation.region | ((z > 0) & (z < nearest))
+    unread = (z == 0) & observation.has_background
+    allowed = observation.region | ((z > 0) & (z < nearest)) | unread
     outside = (~allowed).astype(np.uint8)
     distance, label = cv2.distanceTransformWithLabels(
         outside, cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
