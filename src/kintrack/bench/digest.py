@@ -53,7 +53,7 @@ def code_digest() -> str:
     ]
     digest = hashlib.sha256(_trees(paths))
     model = model_folder()
-    for path in [model / "human.urdf", *sorted((model / "skin").glob("*.npz"))]:
+    for path in [model / "human.urdf", *sorted(model.rglob("*.npz"))]:
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
