@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import UInt8
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy import ndarray
 
 from kintrack.bench.cases import CLEAN
@@ -183,22 +184,24 @@ def _show(axis: Axes, picture: ndarray, title: str) -> None:
 
 
 def _over_distance(axis: Axes, content: dict[str, Any]) -> None:
-    """Non-background IoU over the object's distance; depth only is dashed, one look is dotted."""
+    """Non-background IoU over the object's distance: networks by colour, inputs by line."""
     by_network = content["labels"].get(TEST, {})
     order = (CLEAN, *reversed(CONDITIONS[1:]))
+    styles = dict(zip(MODALITIES, ("-", ":", "--", "-."), strict=True))
     for n, name in enumerate(content["order"]):
-        modalities = by_network.get(name, {})
-        for modality, style in zip(MODALITIES, ("-", ":", "--", "-."), strict=True):
-            found = modalities.get(modality, {})
+        for modality, style in styles.items():
+            found = by_network.get(name, {}).get(modality, {})
             values = [found.get(c, {}).get("non_background_iou") for c in order]
             heights = [np.nan if value is None else 100 * value for value in values]
-            axis.plot(order, heights, style, marker="o", ms=3, lw=1.3, color=f"C{n}",
-                      label=f"{name}, {modality}")  # fmt: skip
+            axis.plot(order, heights, style, marker="o", ms=3, lw=1.3, color=f"C{n}")
     axis.set_ylabel("non-background IoU [%]", fontsize=8)
     axis.set_xlabel("object before the person", fontsize=8)
+    axis.set_ylim(bottom=0)
     axis.tick_params(labelsize=7)
     axis.grid(alpha=0.3, lw=0.5)
-    axis.legend(fontsize=6, frameon=False)
+    handles = [Line2D([], [], ls=style, lw=1.3, color="0.2") for style in styles.values()]
+    axis.legend(handles, list(styles), fontsize=6, frameon=False, ncols=4, loc="upper center",
+                bbox_to_anchor=(0.5, 1.12), columnspacing=1.0)  # fmt: skip
 
 
 def _by_part(axis: Axes, content: dict[str, Any]) -> None:
@@ -217,4 +220,4 @@ def _by_part(axis: Axes, content: dict[str, Any]) -> None:
     axis.set_ylim(0, 102)
     axis.tick_params(axis="y", labelsize=7)
     axis.grid(alpha=0.3, lw=0.5, axis="y")
-    axis.legend(fontsize=6.5, frameon=False, ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.1))
+    axis.legend(fontsize=6.5, frameon=False, ncols=6, loc="upper center", bbox_to_anchor=(0.5, 1.1))
