@@ -45,6 +45,8 @@ QUICK_WIDTHS = {"fast_fcn": "4 4 8 8", "unet": "4 4 8 8 8", "vgg_fcn": "4 4 8 8 
 LAMBDAS = (0.0, 1.0)
 """Weights of the background modifier, beside the usual 0.5."""
 FIGURE = "training.png"
+VALIDATIONS = 10
+"""In the course of a run that is counted in steps."""
 COLUMNS = ("pixel_accuracy", "background_iou", "non_background_iou", "person_iou", "mean_part_iou")
 
 
@@ -94,7 +96,7 @@ def main() -> int:
     pairs = " ".join(f"{name}={files[name]}" for name in tables)
     print(f"the tables: python tests/benchmarks/part_segmentation.py --weights {pairs}")
     if not arguments.quick:
-        figure = _figure({name: path.with_name(LOG_FILE) for name, path in files.items()})
+        figure = _figure(files)
         write_atomically(report.RESULTS.with_name(FIGURE), lambda f: figure.savefig(f, dpi=150))
         report.rewrite_section(report.RESULTS, "training", _section(files, steps, arguments.seed))
         print(f"written: {report.RESULTS.relative_to(report.ROOT)}")
@@ -147,8 +149,10 @@ def _train(
     if not path.is_file():
         bank = ("--bank.cutouts", "4", "--bank.rooms", "2") if arguments.quick else BANK
         threads = [] if arguments.processes == 1 else ["--threads", "1"]
+        often = str(max(1, arguments.steps // VALIDATIONS))
         _kintrack(
             folder, "train", *sets, "-o", recipe.name, "--cache", "cache",
+            "--validation-steps", often,
             "--network.architecture", recipe.architecture, "--network.widths", *widths.split(),
             *options, *recipe.options, *bank, *threads, processes=arguments.processes,
         )  # fmt: skip
@@ -198,17 +202,18 @@ All networks on the same data for {steps} steps, scores [%] on people whom train
 """
 
 
-def _figure(logs: dict[str, Path]) -> Figure:
-    """Loss and validation of every run."""
+def _figure(files: dict[str, Path]) -> Figure:
+    """Loss and validation of every run, the last one after the end."""
     figure = Figure(figsize=(9.0, 3.4), layout="constrained")
     loss, score = figure.subplots(1, 2)
-    for name, path in logs.items():
-        entries = read_log(path)
+    for name, path in files.items():
+        entries, end = read_log(path.with_name(LOG_FILE)), load_weights(path).training
         losses = [(e["step"], e["loss"]) for e in entries if "loss" in e]
         scores = [(e["step"], 100 * e["validation"]["non_background_iou"])
                   for e in entries if "validation" in e]  # fmt: skip
+        scores.append((end["steps"], 100 * end["validation"]["non_background_iou"]))
         loss.plot(*zip(*losses, strict=True), lw=0.8, label=name)
-        score.plot(*zip(*scores, strict=True), lw=1.2, label=name)
+        score.plot(*zip(*scores, strict=True), "o-", ms=3, lw=1.2, label=name)
     loss.set(xlabel="step", ylabel="training loss", yscale="log")
     score.set(xlabel="step", ylabel="non-background IoU of validation [%]")
     for axis in (loss, score):
