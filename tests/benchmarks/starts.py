@@ -105,7 +105,7 @@ anywhere. A tracker that knows nothing gets {FRAMES} frames; a start is locked i
 them the joints that are neither hidden nor outside the image are on average within 20 cm of the
 truth [Wan19, 6]. *All joints* asks the same of hidden ones, too, *each joint in view* that none of
 those in view is further away. *Back to front* is a heading off by more than 120 degrees: whoever
-begins to be tracked is followed both ways for 8 to 20 frames, so that some are still undecided.
+begins to be tracked is followed both ways for 3 to 20 frames, so that some are still undecided.
 
 {target_table(metrics)}
 
