@@ -19,7 +19,7 @@ class RivalConfig:
     wins: float = 0.85
     """Who faces the other way stays if his doubt is smaller than the track's by this factor."""
     wins_late: float = 0.9
-    """The same once it is over."""
+    """The same once it is over, or the track is lost."""
     legs_win: float = 0.8
     """The same for exchanged legs, at any time: legs that nothing shows differ by chance."""
     legs_seen: float = 0.1

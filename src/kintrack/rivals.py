@@ -41,7 +41,7 @@ class Challenge(NamedTuple):
     wins: float
     """He stays if his doubt is smaller than the track's by this factor."""
     wins_late: float
-    """The same once the duel is over."""
+    """The same once the duel is over, or the track is lost."""
 
 
 def challenges(result: FrameResult, config: RivalConfig) -> list[Challenge]:
