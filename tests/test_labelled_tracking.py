@@ -39,6 +39,16 @@ class Constant:
         return np.full(frame.depth_m.shape, self.label, dtype=np.uint8)
 
 
+class Between:
+    """Another segmenter from one frame number up to another."""
+
+    def __init__(self, usual, other, first, last=10**9):
+        self.usual, self.other, self.span = usual, other, range(first, last)
+
+    def segment(self, frame, region=None):
+        return (self.other if frame.index in self.span else self.usual).segment(frame, region)
+
+
 def pose(scene, index):
     return scene.place({"r_elbow_flexion": 20 + 3 * index}, at=(2.8, 0.01 * index, 0.0))
 
@@ -121,9 +131,9 @@ def test_the_same_frames_give_the_same_bytes(scene, film, unsized, gated):
 
 
 def test_a_person_wholly_hidden_is_coasted_and_then_lost(scene, film, unsized):
-    tracker, results = followed(scene, film, unsized, Fixed(film[1]))
+    segmenter = Between(Fixed(film[1]), Constant(0), FRAMES)
+    tracker, results = followed(scene, film, unsized, segmenter)
     patience = tracker.labelled.lifecycle.patience
-    tracker.segmenter = Constant(0)
     after = [
         tracker.step(replace(film[0][-1], index=FRAMES + i, timestamp_s=(FRAMES + i) / 30))
         for i in range(patience)
@@ -139,24 +149,45 @@ def test_a_person_wholly_hidden_is_coasted_and_then_lost(scene, film, unsized):
 def test_with_a_segmenter_stuck_on_one_part_the_body_is_followed_or_given_up(
     scene, film, unsized, label
 ):
-    tracker = Tracker(unsized, segmenter=Fixed(film[1]))
-    tracker.begin(film[0][0], scene.joints(pose(scene, 0)))
-    tracker.segmenter = Constant(label)
-    results = [tracker.step(frame) for frame in film[0][1:8]]
+    segmenter = Between(Fixed(film[1]), Constant(label), 1)
+    _, results = followed(scene, (film[0][:8], film[1]), unsized, segmenter)
     assert {r.status for r in results} <= {"tracking", "lost", "initialising"}
     for index, result in enumerate(results, start=1):
         if result.status == "tracking":
             assert scene.errors(pose(scene, index), result.joint_positions_camera_m).mean() < 0.1
 
 
+@pytest.mark.parametrize("label", [0, 2, 6])
+def test_a_segmenter_stuck_from_the_first_frame_on_begins_nothing(film, unsized, label):
+    tracker = Tracker(unsized, segmenter=Constant(label))
+    for frame in film[0][:3]:
+        result = tracker.step(frame)
+        assert result.status == "initialising" and result.reason
+
+
 def test_labels_that_contradict_the_depth_are_survived(scene, film, unsized):
     noise = np.random.default_rng(0)
     maps = [noise.integers(0, 7, (96, 128)).astype(np.uint8) for _ in range(FRAMES)]
-    tracker = Tracker(unsized, segmenter=Fixed(film[1]))
-    tracker.begin(film[0][0], scene.joints(pose(scene, 0)))
-    tracker.segmenter = Fixed(maps)
-    results = [tracker.step(frame) for frame in film[0][1:8]]
+    segmenter = Between(Fixed(film[1]), Fixed(maps), 1, 5)
+    tracker, results = followed(scene, film, unsized, segmenter)
     assert {r.status for r in results} <= {"tracking", "lost", "initialising"}
+    off = [scene.errors(pose(scene, i + 1), r.joint_positions_camera_m) for i, r in
+           enumerate(results)]  # fmt: skip
+    assert all(o.mean() < 0.1 for o, r in zip(off, results, strict=True) if r.status == "tracking")
+    assert results[-1].status == "tracking" and off[-1][UPPER].mean() < 0.03
+
+
+def test_a_depth_of_nan_is_a_hole_for_the_network_too(scene, film, unsized):
+    pytest.importorskip("openvino")
+    from segmentation.tracking import image_segmenter
+
+    depth = film[0][0].depth_m.copy()
+    depth[:, :40], depth[0, -1] = np.nan, -1.0
+    spoilt = replace(film[0][0], depth_m=depth)
+    empty = replace(film[0][0], depth_m=np.full_like(depth, np.nan))
+    tracker = Tracker(unsized, segmenter=image_segmenter())
+    assert tracker.step(empty).status == "skipped"
+    assert tracker.step(spoilt).status in ("initialising", "tracking")
 
 
 def test_a_map_of_the_wrong_size_is_named(scene, film, unsized):

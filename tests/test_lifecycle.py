@@ -57,6 +57,12 @@ def test_single_bad_frames_are_forgiven_and_a_row_of_them_is_not():
     assert lost.status == "lost" and "50 mm" in lost.reason
 
 
+def test_a_body_that_slid_behind_a_wall_fits_well_and_is_not_seen():
+    behind = replace(GOOD, seen=0.02)
+    assert objection(behind, CONFIG.stay) == objection(behind, CONFIG.begin) == HIDDEN
+    assert objection(replace(GOOD, seen=0.1), CONFIG.begin) is None
+
+
 def test_a_young_track_is_given_up_sooner():
     young = run(Life(), GOOD, GOOD)
     assert run(young, *[BAD] * CONFIG.young_patience).status == "lost"

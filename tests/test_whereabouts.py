@@ -7,7 +7,6 @@ from kintrack.whereabouts import (
     WhereaboutsConfig,
     follow,
     mine,
-    refuse,
     seek,
 )
 
@@ -102,11 +101,3 @@ def test_others_who_left_are_forgotten():
     assert len(where.others) == 1
     where = watch([(body(2, 0),)] * 3, where, start_s=CONFIG.forget_s + 1.0)
     assert where.others == ()
-
-
-def test_somebody_who_could_not_be_fitted_lets_the_next_one_go_first():
-    near, far = body(2, 0), body(4, 0)
-    where = refuse(Whereabouts(), near, 0.0)
-    assert seek(where, (near, far), 0.1, CONFIG)[1] is far
-    assert seek(where, (near,), 0.1, CONFIG)[1] is near
-    assert seek(where, (near, far), 0.1 + CONFIG.refuse_s, CONFIG)[1] is near

@@ -35,6 +35,8 @@ class Agreement:
     supported: float
     """Share of the visible skin that has an observed point near it, 0 to 1; skin behind something
     else is not asked."""
+    seen: float
+    """Share of all skin that the camera would see which has an observed point near it, 0 to 1."""
     vertex_supported: Bool[ndarray, " v"]
     """Visible vertices with an observed point near them."""
 
@@ -66,6 +68,7 @@ def agreement(view: View, observation: Observation, explained_m: float) -> Agree
     return Agreement(
         explained=(len(pairs.vertex) - pairs.from_skin) / max(asked, 1),
         supported=pairs.from_skin / max(int((view.visible & (supported | ~hidden)).sum()), 1),
+        seen=pairs.from_skin / max(int(view.visible.sum()), 1),
         vertex_supported=supported,
     )
 

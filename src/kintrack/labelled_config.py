@@ -117,8 +117,6 @@ class WhereaboutsConfig:
     """So long after a loss nobody who may be somebody else is taken [s]."""
     forget_s: float = 8.0
     """Others not seen for this long are forgotten [s]."""
-    refuse_s: float = 1.0
-    """So long after somebody could not be fitted anybody else is tried first [s]."""
 
     def __post_init__(self) -> None:
         check_bounds(
@@ -129,7 +127,6 @@ class WhereaboutsConfig:
             carry_s=(0, 10),
             hold_s=(0, 1e4),
             forget_s=(0, 1e4),
-            refuse_s=(0, 1e4),
         )
 
 

@@ -20,6 +20,8 @@ from kintrack.labelled_config import LifecycleConfig, Limits
 NOBODY = "nobody in view"
 HIDDEN = "hardly anything of the person is seen"
 GONE = "the lost person is not in view"
+LEAST_SEEN = 0.04
+"""Less of the skin with points near it says nothing: a body that slid behind a wall fits well."""
 UNFITTED = "the body does not fit what is seen of the person"
 
 
@@ -35,6 +37,8 @@ class Reading:
     """Share of the skin that should be seen and has a point near it."""
     labels: float = 1.0
     """Share of skin seen on the person whose label is the pixel's; 1 without labels."""
+    seen: float = 1.0
+    """Share of all skin that faces the camera which has a point near it."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ def judged(life: Life, reading: Reading, config: LifecycleConfig) -> Life:
 
 def objection(reading: Reading, limits: Limits) -> str | None:
     """What speaks against a frame in words; None if nothing does."""
-    if not math.isfinite(reading.rms_m):
+    if not math.isfinite(reading.rms_m) or reading.seen < LEAST_SEEN:
         return HIDDEN
     if reading.rms_m > limits.max_rms_m:
         return f"residual {1e3 * reading.rms_m:.0f} mm; {1e3 * limits.max_rms_m:.0f} are allowed"

@@ -29,6 +29,7 @@ from kintrack.rivals import Duel, Vigil
 from kintrack.segmenter import Segmenter, Watched
 from kintrack.sequence.frame import Frame
 from kintrack.skin import skinned_vertices
+from kintrack.solver.choice import check_installed
 from kintrack.whereabouts import Whereabouts
 
 
@@ -53,8 +54,12 @@ class Memory:
             clock: Called after each stage with its name, for benchmarks.
             segmenter: Labels every frame; None for the geometry alone.
             labelled: What belongs to labels; the defaults if None.
+
+        Raises:
+            ConfigError: if the solver is not installed.
         """
         self.config = TrackerConfig() if config is None else config
+        check_installed(self.config.solver.method)
         self.T_world_camera = T_world_camera
         self.segmenter = None if segmenter is None else Watched(segmenter)
         self.labelled = LabelledConfig() if labelled is None else labelled

@@ -143,6 +143,33 @@ def only(observation: Observation, body: Somebody) -> Observation:
     return replace(observation, region=body.mask & observation.region, labels=labels)
 
 
+def without_others(
+    observation: Observation,
+    own: Somebody,
+    people: tuple[Somebody, ...],
+    config: PeopleConfig | None = None,
+) -> Observation:
+    """The observation without the labels of everybody else who surely is somebody else.
+
+    Args:
+        observation: Labelled points.
+        own: The person.
+        people: Everybody in view.
+        config: What parts people: a head or a trunk of one's own, far enough away. A limb alone may
+            be the person's behind something.
+    """
+    assert observation.labels is not None
+    config = PeopleConfig() if config is None else config
+    theirs = np.zeros_like(observation.region)
+    for body in people:
+        area, away = body.part_area_m2, np.linalg.norm(body.place_world - own.place_world)
+        whole = area[HEAD] >= config.head_m2 or area[TORSO] >= config.torso_m2
+        if body is not own and whole and away > config.torsos_m:
+            theirs |= body.mask
+    labels = np.where(theirs, np.uint8(0), observation.labels)
+    return replace(observation, region=observation.region & ~theirs, labels=labels)
+
+
 @dataclass(frozen=True)
 class _Piece:
     points: Float[ndarray, "n 3"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which pixels are the person's, and whether he is tracked: what the tracker asks before a fit."""
+"""Which pixels are the person's, and when tracking ends: what the tracker asks before a fit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kintrack.config import JudgeConfig
 from kintrack.geometry import transform_points
 from kintrack.labelled_config import LabelledConfig, LifecycleConfig, Limits
 from kintrack.objective_config import PullConfig
-from kintrack.people import find_people, only
+from kintrack.people import find_people, only, without_others
 from kintrack.residuals.targets import TargetResidual
 from kintrack.targets import find_targets
 from kintrack.whereabouts import Whereabouts, follow, mine, seek
@@ -39,7 +39,7 @@ def own_pixels(
     T_world_camera: Float[ndarray, "4 4"],
     config: LabelledConfig,
 ) -> tuple[Observation, Whereabouts]:
-    """The observation with the followed person's labels alone.
+    """The observation without the labels of people who are not followed.
 
     Args:
         observation: All labelled points.
@@ -50,8 +50,10 @@ def own_pixels(
         config: Who is a person, and who is who.
 
     Returns:
-        The observation and who is where now. Its region is empty if he is not in view; it is the
-        whole if he is tracked but cannot be told from the others. Without labels nothing changes.
+        The observation and who is where now. While he is tracked, whoever surely is somebody else
+        is taken out; it is the whole if he cannot be told from the others. While he is not, it has
+        the pixels of one person alone, and no region if he is not in view. Without labels nothing
+        changes.
     """
     if observation.labels is None:
         return observation, where
@@ -59,7 +61,9 @@ def own_pixels(
     if tracked:
         own = mine(where, people, timestamp_s, config.whereabouts)
         where = follow(where, own, people, timestamp_s, config.whereabouts)
-        return (observation if own is None else only(observation, own)), where
+        if own is not None:
+            observation = without_others(observation, own, people, config.start.people)
+        return observation, where
     where, own = seek(where, people, timestamp_s, config.whereabouts)
     if own is None:
         nobody = np.zeros_like(observation.region)

@@ -125,4 +125,4 @@ def reading_of(fit: Fit, view: View, agreed: Agreement, observation: Observation
     labels = 1.0
     if observation.labels is not None:
         labels = label_agreement(label_counts(view, observation))
-    return Reading(fit.surface.rms_m, agreed.explained, agreed.supported, labels)
+    return Reading(fit.surface.rms_m, agreed.explained, agreed.supported, labels, agreed.seen)

@@ -19,8 +19,9 @@ from kintrack.deformation.surface import followed
 from kintrack.errors import AssociationError
 from kintrack.geometry import invert_rigid, transform_points
 from kintrack.human import Human
+from kintrack.joints import JOINT_NAMES
 from kintrack.judge import agreement
-from kintrack.lifecycle import HIDDEN, NOBODY, UNFITTED, Life, absent, judged, unbegun
+from kintrack.lifecycle import HIDDEN, LEAST_SEEN, NOBODY, UNFITTED, Life, absent, judged, unbegun
 from kintrack.memory import Memory
 from kintrack.occlusion import hidden_hinges, unseen_hinges
 from kintrack.person import own_pixels, part_pull
@@ -29,10 +30,13 @@ from kintrack.residuals.prior import TangentPrior, diagonal_prior
 from kintrack.result import FrameResult
 from kintrack.rivals import Duel, Vigil, challenges
 from kintrack.segmenter import Told, checked_labels, region_of
-from kintrack.sequence.frame import Frame
+from kintrack.sequence.frame import Frame, readable
 from kintrack.settling import settle
 from kintrack.solver.gauss_newton import normal_equations
 from kintrack.start import Start, found_by, in_own_size
+from kintrack.whereabouts import met
+
+CHEST = JOINT_NAMES.index("chest")
 
 
 class Tracker(Memory):
@@ -52,7 +56,7 @@ class Tracker(Memory):
         with self._threads.limit(limits=1, user_api="blas"):
             if not self.tracks:
                 self._vigil = Vigil(self.config.rival)
-            self.amended = ()
+            self.amended, frame = (), readable(frame)
             result = self._step(frame)
             return self._settled(frame, result) if self.config.rival.most_frames else result
 
@@ -70,7 +74,7 @@ class Tracker(Memory):
         Raises:
             ConfigError: if a joint that is needed is missing.
         """
-        began = time.perf_counter()
+        began, frame = time.perf_counter(), readable(frame)
         if frame.problem is not None or frame.depth_m is None:
             return self._nothing(frame, "skipped", began, frame.problem or "no depth")
         with self._threads.limit(limits=1, user_api="blas"):
@@ -206,8 +210,10 @@ class Tracker(Memory):
         return self._meet_at(frame, person, found, began)
 
     def _meet_at(self, frame: Frame, person: Human, found: Start, began: float) -> FrameResult:
-        """Take a start as the first pose."""
+        """Take a start as the first pose of whom is followed from now on."""
         self._meet(person)
+        place = found.fit.state.joint_positions_world[CHEST]
+        self._where = met(self._where, place, frame.timestamp_s)
         priors = [diagonal_prior(self._resting, self._prior_sigma)]
         none = np.zeros(person.body.nv, dtype=bool)
         return self._report(frame, found.observation, found.fit, priors, none, none, began)
@@ -227,6 +233,8 @@ class Tracker(Memory):
         T_camera_world = invert_rigid(self.T_world_camera)
         view = self._view(fit.state, observation)
         agreed = agreement(view, observation, config.judge.explained_m)
+        if self.belief is not None and agreed.seen < LEAST_SEEN:
+            return self._miss(frame, observation, began)
         H, _, _ = normal_equations(fit.state, [fit.surface, *priors])
         covariance = np.linalg.inv(H + 1e-9 * np.eye(body.nv))
         last, now_s, q = self.belief, frame.timestamp_s, fit.state.q
@@ -269,7 +277,7 @@ class Tracker(Memory):
         return self.surface.offsets_m
 
     def _miss(self, frame: Frame, observation: Observation, began: float) -> FrameResult:
-        """Nothing of the person was seen: with labels she is hidden, or else forgotten."""
+        """Next to nothing of the person was seen: with labels she is hidden, or else forgotten."""
         assert self.belief is not None
         body, config, now_s = self._fitted.body, self.config, frame.timestamp_s
         machine, labelled = self._lifecycle(observation), observation.labels is not None

@@ -17,9 +17,6 @@ from numpy import ndarray
 from kintrack.labelled_config import WhereaboutsConfig
 from kintrack.people import Somebody, choose
 
-REFUSED_SHARE = 0.25
-"""Instead of somebody who could not be fitted, people are tried who show this share of the most."""
-
 
 @dataclass(frozen=True)
 class Known:
@@ -53,8 +50,13 @@ class Whereabouts:
     """The person who is, or was, followed."""
     others: tuple[Known, ...] = ()
     """Everybody else."""
-    refused: Known | None = None
-    """Whoever was tried last and could not be fitted."""
+
+
+def met(
+    where: Whereabouts, place_world: Float[ndarray, " 3"], timestamp_s: float
+) -> Whereabouts:
+    """What is known once somebody begins to be followed at a place [m]."""
+    return replace(where, own=Known(place_world, np.zeros(3), timestamp_s))
 
 
 def follow(
@@ -103,12 +105,11 @@ def seek(
     """
     own = where.own
     if own is None or timestamp_s - own.seen_s > config.hold_s:
-        tried = _not_refused(where, people, timestamp_s, config) or people
-        found = choose(tried) if own is None else choose(_large(tried), own.place_world)
+        found = choose(people) if own is None else choose(_large(people), own.place_world)
         rest = [body for body in people if body is not found]
         return replace(where, others=_others(where, rest, timestamp_s, config)), found
     found = None
-    gone_s = timestamp_s - own.seen_s
+    gone_s = max(timestamp_s - own.seen_s, 0.0)
     pairs = _pairs(where.others, people, timestamp_s, config)
     reach = config.reach_m + config.walk_m_s * gone_s
     for n, body in enumerate(people):
@@ -125,11 +126,6 @@ def seek(
     return replace(where, others=_others(where, rest, timestamp_s, config)), found
 
 
-def refuse(where: Whereabouts, body: Somebody, timestamp_s: float) -> Whereabouts:
-    """What is known after a first pose of somebody was rejected."""
-    return replace(where, refused=Known(body.place_world, np.zeros(3), timestamp_s))
-
-
 def mine(
     where: Whereabouts, people: tuple[Somebody, ...], timestamp_s: float, config: WhereaboutsConfig
 ) -> Somebody | None:
@@ -143,22 +139,6 @@ def mine(
         if who not in matched and n not in matched.values():
             matched[who] = n
     return people[matched[0]] if 0 in matched else None
-
-
-def _not_refused(
-    where: Whereabouts, people: tuple[Somebody, ...], timestamp_s: float, config: WhereaboutsConfig
-) -> tuple[Somebody, ...]:
-    """People other than the one who could not be fitted a moment ago."""
-    refused = where.refused
-    if refused is None or timestamp_s - refused.seen_s > config.refuse_s:
-        return people
-    place = refused.place_world
-    return tuple(
-        body
-        for body in people
-        if np.linalg.norm(body.place_world - place) > config.reach_m
-        and body.area_m2 >= REFUSED_SHARE * max(other.area_m2 for other in people)
-    )
 
 
 def _large(people: tuple[Somebody, ...]) -> tuple[Somebody, ...]:

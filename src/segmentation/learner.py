@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import timedelta
 
 import numpy as np
 import torch
@@ -21,6 +22,10 @@ from segmentation.muon import Muon
 from segmentation.networks import PartNetwork, tensors_of, unfold
 from segmentation.training_config import TrainConfig
 from segmentation.weights import Weights
+
+
+LONGEST_WAIT = timedelta(hours=12)
+"""So long the others wait while the first one packs pictures and prepares samples."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +72,7 @@ def join_group(config: TrainConfig) -> Group:
     if config.threads and not on_gpu:
         torch.set_num_threads(config.threads)
     if world > 1 and not torch.distributed.is_initialized():
-        torch.distributed.init_process_group("nccl" if on_gpu else "gloo")
+        torch.distributed.init_process_group("nccl" if on_gpu else "gloo", timeout=LONGEST_WAIT)
     return Group(rank, world, device)
 
 

@@ -115,14 +115,14 @@ def divided(packs: Mapping[str, Path], division: Division, share: float) -> Spli
     Args:
         packs: Recording -> folder of its pack.
         division: Which recordings are on which side.
-        share: Share of a single recording that is held out.
+        share: Share of a single recording that is held out; `LEAST` pictures train in any case.
     """
     train, held = (
         everything([packs[name] for name in names]) for names in (division.train, division.held)
     )
     if division.by != "time":
         return Split(train, held)
-    first = len(held) - max(LEAST, round(share * len(held)))
+    first = max(len(held) - max(LEAST, round(share * len(held))), LEAST + GAP)
     return Split(
         Pictures(train.packs, train.where[: first - GAP]), Pictures(held.packs, held.where[first:])
     )

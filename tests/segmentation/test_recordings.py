@@ -55,6 +55,9 @@ def test_a_single_recording_is_cut_in_time_with_a_caution(tmp_path):
     both = divided({"a": tmp_path / ".pack"}, found, 0.2)
     assert both.validation.where[:, 2].tolist() == list(range(48, 60))
     assert both.train.where[:, 2].tolist() == list(range(33))
+    most = divided({"a": tmp_path / ".pack"}, found, 0.9)
+    assert most.train.where[:, 2].tolist() == list(range(10))
+    assert most.validation.where[:, 2].tolist() == list(range(25, 60))
     with pytest.raises(DatasetError, match="30 usable frames of one recording.*second recording"):
         divide({"a": 30}, {}, 0.2)
 

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from kintrack.body import run_kinematics
+from kintrack.config import SolverConfig, TrackerConfig
 from kintrack.errors import ConfigError
 from kintrack.residuals.prior import diagonal_prior
 from kintrack.solver import gauss_newton, ipopt, nlp
 from kintrack.solver.choice import SOLVERS
 from kintrack.solver.ipopt import minimise, solve
+from kintrack.tracker import Tracker
 from residual_terms import joints, motion_prior, pose_prior, silhouette, surface
 
 pytest.importorskip("casadi")
@@ -227,11 +229,11 @@ def test_it_solves_in_other_threads_too(body, legal_pose):
     assert found[0].status == "converged"
 
 
-def test_without_casadi_the_error_says_what_to_install(body, legal_pose, monkeypatch):
-    nlp.programme.cache_clear()
+def test_without_casadi_no_tracker_is_set_up_and_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "casadi", None)
+    Tracker(TrackerConfig())
     with pytest.raises(ConfigError, match=r"kintrack\[ipopt\]"):
-        minimise(body, run_kinematics(body, legal_pose(1)), [pull(body, legal_pose(2))])
+        Tracker(TrackerConfig(solver=SolverConfig(method="ipopt")))
 
 
 def test_solvers_are_found_by_name():

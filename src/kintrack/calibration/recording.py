@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
+from kintrack.alignment import view_skin
 from kintrack.association.observation import Observation, box_around, observe, within
 from kintrack.body import run_kinematics
 from kintrack.calibration.calibrator import Calibrator
@@ -16,12 +17,12 @@ from kintrack.calibration.config import CalibrationConfig
 from kintrack.calibration.person import Person
 from kintrack.calibration.selection import varied
 from kintrack.config import TrackerConfig
-from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
+from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid
 from kintrack.human import Human
 from kintrack.result import Track
 from kintrack.segmenter import Segmenter, checked_labels, region_of
 from kintrack.sequence.frame import Frame, SequenceReader
-from kintrack.skin import skinned_vertices
+from kintrack.settling import settle
 
 MARGIN_M = 0.12
 """Points further than this from the tracked body's box are not the person's [m]."""
@@ -83,7 +84,8 @@ def person_in(
     labels: UInt8[ndarray, "r c"] | None,
     tracker: TrackerConfig,
 ) -> Observation:
-    """What a frame shows of the person: her labels, or without labels everything, near her pose.
+    """What a frame shows of the person near her pose: her labels, settled as while tracking
+    (`settling.py`), or without labels everything.
 
     Args:
         frame: A good frame.
@@ -93,7 +95,8 @@ def person_in(
         labels: The frame's labels; None if it is not labelled.
         tracker: How a frame is observed.
     """
-    a = tracker.association
-    skin = skinned_vertices(run_kinematics(human.body, q), human.skin)
-    box = box_around(transform_points(invert_rigid(T_world_camera), skin), MARGIN_M)
-    return within(observe(frame, a.max_width_px, a.background_share, labels), box)
+    a, T_camera_world = tracker.association, invert_rigid(T_world_camera)
+    seen = observe(frame, a.max_width_px, a.background_share, labels)
+    view = view_skin(human, run_kinematics(human.body, q), T_camera_world, seen, tracker)
+    near = within(seen, box_around(view.vertices_camera, MARGIN_M))
+    return settle(near, view, a.doubt_m, a.side_m)

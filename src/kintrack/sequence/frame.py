@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
@@ -32,6 +33,14 @@ class Frame:
     """True part labels, any size with the depth's aspect; None if there are none."""
     problem: str | None = None
     """Why the frame is unusable; None for a good frame."""
+
+
+def readable(frame: Frame) -> Frame:
+    """The frame with 0 for every depth that is no reading: NaN, as ROS has it, infinite, negative."""
+    depth = frame.depth_m
+    if depth is None or bool(np.all((depth >= 0.0) & (depth < np.inf))):
+        return frame
+    return replace(frame, depth_m=np.where((depth >= 0.0) & (depth < np.inf), depth, 0.0))
 
 
 class SequenceReader(Protocol):

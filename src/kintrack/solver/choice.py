@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from kintrack.body import Body, BodyState
+from kintrack.errors import ConfigError
 from kintrack.residuals.linearization import Residual
 from kintrack.solver import gauss_newton, ipopt
 from kintrack.solver.gauss_newton import Solution
@@ -29,3 +30,20 @@ class Solve(Protocol):
 
 SOLVERS: dict[str, Solve] = {"gauss-newton": gauss_newton.solve, "ipopt": ipopt.solve}
 """Name -> solver."""
+
+
+def check_installed(method: str) -> None:
+    """Pass if a solver can run here.
+
+    Raises:
+        ConfigError: if IPOPT is wanted and CasADi, which brings it, cannot be imported.
+    """
+    if method != "ipopt":
+        return
+    try:
+        import casadi  # noqa: F401
+    except ImportError as error:
+        raise ConfigError(
+            f"solver 'ipopt' needs CasADi ({error}); pip install 'kintrack[ipopt]', or take "
+            "'gauss-newton'"
+        ) from error

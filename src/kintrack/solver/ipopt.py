@@ -18,7 +18,6 @@ import numpy as np
 from numpy import ndarray
 
 from kintrack.body import Body, BodyState, run_kinematics
-from kintrack.errors import ConfigError
 from kintrack.residuals.linearization import Residual
 from kintrack.solver.gauss_newton import Solution
 from kintrack.solver.interrupts import signals_put_off
@@ -75,7 +74,7 @@ def solve(
         The best state found.
 
     Raises:
-        ConfigError: if CasADi is not installed, or a term is of a kind that is not known.
+        ConfigError: if a term is of a kind that is not known.
     """
     outcome = minimise(body, state, residuals, steps, damping)
     if outcome.status != "converged":
@@ -143,13 +142,7 @@ def _run(
 ) -> _Run:
     """Build the programme at its first use, and solve it."""
     rows = tuple(tuple(row) for row in together.tolist())
-    try:
-        made = programme(tree_of(body), rows, given.places.shape[1], iterations)
-    except ImportError as error:
-        raise ConfigError(
-            f"solver 'ipopt' needs CasADi ({error}); pip install 'kintrack[ipopt]', or take "
-            "'gauss-newton'"
-        ) from error
+    made = programme(tree_of(body), rows, given.places.shape[1], iterations)
     angles = np.concatenate([np.zeros(6), start.q[7:]])
     bounds = {"lbx": body.lower - angles, "ubx": body.upper - angles}
     x = made.solver(x0=0.0, p=given.packed().tolist(), **bounds)["x"]
