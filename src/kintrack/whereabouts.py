@@ -52,9 +52,7 @@ class Whereabouts:
     """Everybody else."""
 
 
-def met(
-    where: Whereabouts, place_world: Float[ndarray, " 3"], timestamp_s: float
-) -> Whereabouts:
+def met(where: Whereabouts, place_world: Float[ndarray, " 3"], timestamp_s: float) -> Whereabouts:
     """What is known once somebody begins to be followed at a place [m]."""
     return replace(where, own=Known(place_world, np.zeros(3), timestamp_s))
 

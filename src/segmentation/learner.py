@@ -23,7 +23,6 @@ from segmentation.networks import PartNetwork, tensors_of, unfold
 from segmentation.training_config import TrainConfig
 from segmentation.weights import Weights
 
-
 LONGEST_WAIT = timedelta(hours=12)
 """So long the others wait while the first one packs pictures and prepares samples."""
 

@@ -84,8 +84,9 @@ def person_in(
     labels: UInt8[ndarray, "r c"] | None,
     tracker: TrackerConfig,
 ) -> Observation:
-    """What a frame shows of the person near her pose: her labels, settled as while tracking
-    (`settling.py`), or without labels everything.
+    """What a frame shows of the person near her pose.
+
+    That is her labels, settled as while tracking (`settling.py`), or everything without labels.
 
     Args:
         frame: A good frame.

@@ -36,7 +36,7 @@ class Frame:
 
 
 def readable(frame: Frame) -> Frame:
-    """The frame with 0 for every depth that is no reading: NaN, as ROS has it, infinite, negative."""
+    """The frame with 0 for every depth that is no reading: negative, infinite, or ROS's NaN."""
     depth = frame.depth_m
     if depth is None or bool(np.all((depth >= 0.0) & (depth < np.inf))):
         return frame
