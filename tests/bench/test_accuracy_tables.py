@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from kintrack.bench.cases import CONDITIONS, GAPS, Case
-from kintrack.bench.figure import draw_curves, draw_joints, in_words, write_pictures
+from kintrack.bench.figure import draw_curves, draw_joints, draw_waits, in_words, write_pictures
 from kintrack.bench.scores import Errors
 from kintrack.bench.summary import content_of
 from kintrack.bench.tables import all_grids
@@ -100,6 +100,24 @@ def test_joints_are_those_of_the_first_network(content):
     (axis,) = draw_joints(content["scores"]).axes
     assert axis.get_title().startswith("fast:")
     assert {round(bar.get_height(), 6) for bar in axis.patches} == {3.0}
+
+
+def test_waits_rise_where_the_person_is_found(content):
+    start, again = draw_waits(content["scores"]).axes
+    (line,) = start.lines
+    assert line.get_label() == "fast (1)" and line.get_ydata()[:2].tolist() == [0.0, 100.0]
+    found = {line.get_label(): line.get_ydata()[-1] for line in again.lines}
+    assert found == {"geometry alone (2)": 0.0, "fast (2)": 100.0, "unet (2)": 100.0,
+                     "RGB regression (2)": 100.0}  # fmt: skip
+
+
+def test_the_effect_of_targets_is_told_in_millimetres(content):
+    clean = content["scores"]["fast"]["room"]["clean"]
+    off = clean | {"all": clean["all"] | {"mean_m": 0.0315}}
+    content["scores"]["fast_no_targets"] = {"room": {"clean": off}}
+    found = {target.what: target for target in targets(content)}
+    effect = found["effect of the targets on the mean error while tracking, no object"]
+    assert effect.measured == pytest.approx(1.5) and effect.unit == "mm" and effect.passed
 
 
 def test_nothing_scored_is_nothing_drawn(tmp_path):

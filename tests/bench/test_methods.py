@@ -31,7 +31,14 @@ def test_targets_are_switched_off_for_the_first_network_only():
     assert {m.name for m in methods_of(FILES) if not m.targets} == {
         "fast_no_targets", "fast_no_targets_cold"
     }  # fmt: skip
-    assert "fast_no_targets" in asked("room", "absent 2 s") - asked("room", "60 cm")
+    assert "fast_no_targets" in asked("room", "absent 2 s") & asked("room", "clean")
+    assert "fast_no_targets" not in asked("room", "60 cm")
+
+
+def test_hard_gates_are_compared_for_the_first_network_only():
+    assert [m.name for m in methods_of(FILES) if not m.soft] == ["fast_hard_gates"]
+    assert "fast_hard_gates" in asked("room", "30 cm") & asked("room", "clean")
+    assert "fast_hard_gates" not in asked("scenes", "clean") | asked("room", "absent 2 s")
 
 
 def test_full_scenes_are_started_cold_without_true_labels():

@@ -31,6 +31,7 @@ QUICK = {"recordings": 1, "frames": 90, "real_recordings": 1}
 PICTURES = {
     "accuracy.png": "accuracy.png",
     "joints.png": "accuracy_joints.png",
+    "waits.png": "waits.png",
     "methods.png": "methods.png",
 }
 """Pictures of the bench -> their names in docs/."""
@@ -92,7 +93,10 @@ colour image, each landmark lifted by the depth around its pixel and pushed inwa
 thickness; a landmark of visibility up to 0.5 or without depth is a missing joint. *Calibrated* is
 what `kintrack fit` does by itself: the person's shape and clothes are estimated in the first
 second; the others track the average adult in the size of the first frame, so that they differ by
-labels alone.
+labels alone. *Hard gates* pair a vertex with pixels of its own label only and never take a second
+label, as [Wan19] does; everything else weighs another part's pixels less (`association/window.py`).
+*Targets off* takes away the pull at rough places of parts, which acts while tracking; a start does
+not need them, for it searches postures and headings (`start/`).
 
 Means are over joints with a pose; joints without one count as beyond every threshold, so a method
 that gives up has a good mean and a poor curve. Limbs are shoulders, elbows, wrists, hips, knees and
@@ -106,6 +110,8 @@ jumps between people, so that no tracker can agree with it throughout.
 ![The same frames as each method understood them; which frames was settled beforehand.](methods.png)
 
 ![Mean error of every joint.](accuracy_joints.png)
+
+![How soon the person is found, and found again; in brackets, the recordings.](waits.png)
 
 {shown}
 

@@ -14,11 +14,13 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.export.overlay import upscaled
+from kintrack.segmenter import Segmenter
 from kintrack.sequence import Frame
 from kintrack.tracker import Tracker
 
-STAGES = ("observe", "skin", "associate", "solve", "report")
-"""Stages of a frame that is tracked, in order; "observe" contains the prediction."""
+STAGES = ("observe", "skin", "associate", "solve", "report", "rival")
+"""Stages of a frame that is tracked, in order; "observe" contains prediction and labels, "rival"
+all that rivals take."""
 
 
 @dataclass
@@ -66,7 +68,11 @@ def median_p95(values: Float[ndarray, " n"]) -> tuple[float, float]:
 
 
 def time_tracker(
-    name: str, recording: Iterable[Frame], passes: int, limit: int | None = None
+    name: str,
+    recording: Iterable[Frame],
+    passes: int,
+    limit: int | None = None,
+    segmenter: Segmenter | None = None,
 ) -> Timing:
     """Track a recording a few times, each time with a new tracker.
 
@@ -75,6 +81,7 @@ def time_tracker(
         recording: Iterated once a pass.
         passes: How many times.
         limit: Frames a pass; None for all.
+        segmenter: Labels every frame; None for the geometry alone.
 
     Returns:
         The times of all passes.
@@ -86,7 +93,7 @@ def time_tracker(
     wall_s, processor_s = 0.0, 0.0
     for _ in range(passes):
         clock = StageClock()
-        tracker = Tracker(clock=clock)
+        tracker = Tracker(clock=clock, segmenter=segmenter)
         for frame in islice(recording, limit):
             starting = tracker.belief is None
             began, processor = time.perf_counter(), time.process_time()

@@ -12,12 +12,22 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from kintrack.bench.cases import ALONE, CLEAN, OBJECTS, REAL, ROOM, SCENE
-from kintrack.bench.methods import CALIBRATED, COLD, GEOMETRY, NO_TARGETS, RGB, TRUE_LABELS
+from kintrack.bench.cases import ALONE, CLEAN, GAPS, OBJECTS, REAL, ROOM, SCENE
+from kintrack.bench.methods import (
+    CALIBRATED,
+    COLD,
+    GEOMETRY,
+    HARD,
+    NO_TARGETS,
+    RGB,
+    TRUE_LABELS,
+)
 from kintrack.files import write_atomically
 from kintrack.joints import JOINT_NAMES
 
-CURVES_FILE, JOINTS_FILE = "accuracy.png", "joints.png"
+CURVES_FILE, JOINTS_FILE, WAITS_FILE = "accuracy.png", "joints.png", "waits.png"
+WAITS = ("locked_after", "recovered_after")
+"""Frames to the first right pose from a cold start, and after a gap."""
 SHOWN = (CLEAN, SCENE, *reversed(OBJECTS))
 """Conditions that have curves."""
 TITLES = {
@@ -28,12 +38,13 @@ TITLES = {
 _NAMES = {GEOMETRY: "geometry alone", TRUE_LABELS: "true labels", RGB: "RGB regression"}
 _COLORS = {GEOMETRY: "#d55e00", TRUE_LABELS: "#000000", RGB: "#cc79a7"}
 _NETWORKS = ("#0072b2", "#009e73", "#e69f00", "#56b4e9", "#999999")
+_STYLES = {CALIBRATED: "-.", HARD: ":"}
 _CONDITIONS = {CLEAN: "#999999", SCENE: "#000000", **dict(
     zip(OBJECTS, ("#d55e00", "#e69f00", "#56b4e9"), strict=True))}  # fmt: skip
 
 
 def write_pictures(content: dict[str, Any], folder: Path) -> tuple[Path, ...]:
-    """Draw `accuracy.png` and `joints.png` from the content of `accuracy.json`.
+    """Draw `accuracy.png`, `joints.png` and `waits.png` from the content of `accuracy.json`.
 
     Returns:
         The files; none if nothing was scored.
@@ -45,6 +56,8 @@ def write_pictures(content: dict[str, Any], folder: Path) -> tuple[Path, ...]:
     if not any(group in TITLES for groups in scores.values() for group in groups):
         return ()
     figures = {CURVES_FILE: draw_curves(scores), JOINTS_FILE: draw_joints(scores)}
+    if any(waits_of(scores, kind) for kind in WAITS):
+        figures[WAITS_FILE] = draw_waits(scores)
     for name, figure in figures.items():
         write_atomically(folder / name, partial(figure.savefig, format="png", dpi=160))
     return tuple(folder / name for name in figures)
@@ -53,16 +66,17 @@ def write_pictures(content: dict[str, Any], folder: Path) -> tuple[Path, ...]:
 def in_words(method: str) -> str:
     """What a method is called in pictures and tables."""
     warm = method.removesuffix(COLD)
-    bare = warm.removesuffix(NO_TARGETS).removesuffix(CALIBRATED)
-    off = ", targets off" if NO_TARGETS in warm else ", calibrated" if CALIBRATED in warm else ""
-    return _NAMES.get(bare, bare) + off + (", cold start" if warm != method else "")
+    bare = warm.removesuffix(NO_TARGETS).removesuffix(CALIBRATED).removesuffix(HARD)
+    said = {NO_TARGETS: ", targets off", CALIBRATED: ", calibrated", HARD: ", hard gates"}
+    how = next((words for suffix, words in said.items() if warm.endswith(suffix)), "")
+    return _NAMES.get(bare, bare) + how + (", cold start" if warm != method else "")
 
 
 def draw_curves(scores: dict[str, Any]) -> Figure:
     """Share of joints within a threshold.
 
-    A colour per method, dashed where it starts cold, dash-dotted where the person is calibrated; a
-    row per group of recordings and kind of joint, a column per condition.
+    A colour per method, dashed where it starts cold, dash-dotted where the person is calibrated,
+    dotted with hard gates; a row per group of recordings and kind of joint, a column per condition.
     """
     rows = [
         (group, part)
@@ -102,7 +116,7 @@ def _curves(
     axis: Axes, scores: dict[str, Any], group: str, condition: str, part: str
 ) -> dict[str, Any]:
     lines = {}
-    kinds = {name: name.removesuffix(COLD).removesuffix(CALIBRATED) for name in scores}
+    kinds = {n: n.removesuffix(COLD).removesuffix(CALIBRATED).removesuffix(HARD) for n in scores}
     bare = list(dict.fromkeys(kind for kind in kinds.values() if kind not in _NAMES))
     for method, groups in scores.items():
         found = groups.get(group, {}).get(condition)
@@ -113,11 +127,51 @@ def _curves(
         (lines[method],) = axis.plot(
             100 * np.array(found["thresholds_m"]),
             100 * np.array(found[part]["accuracy"]),
-            "--" if name != method else "-." if CALIBRATED in name else "-",
+            "--" if name != method else _STYLES.get(name.removeprefix(kinds[method]), "-"),
             color=color,
             lw=1.9 if bare and name == bare[0] else 1.2,
         )
     return lines
+
+
+def waits_of(scores: dict[str, Any], kind: str) -> dict[str, list[int | None]]:
+    """Method -> frames it took in every recording in a room, None where it never found the person.
+
+    Args:
+        scores: Of `accuracy.json`.
+        kind: One of `WAITS`: starts of methods that start cold, or what came after a gap.
+    """
+    starts = kind == WAITS[0]
+    found = {
+        method: [
+            frames
+            for condition, of in groups.get(ROOM, {}).items()
+            if (condition in GAPS) != starts
+            for frames in of[kind]
+        ]
+        for method, groups in scores.items()
+        if method.endswith(COLD) == starts
+    }
+    return {method: waits for method, waits in found.items() if waits}
+
+
+def draw_waits(scores: dict[str, Any]) -> Figure:
+    """Share of the recordings in which the person is found within so many frames."""
+    figure = Figure(figsize=(8.6, 3.6), layout="constrained")
+    titles = "cold start: frames to lock on", "after 2 s hidden or away: frames to recover"
+    for axis, kind, title in zip(figure.subplots(1, 2, sharey=True), WAITS, titles, strict=True):
+        for method, waits in waits_of(scores, kind).items():
+            frames = np.arange(61)
+            share = [np.mean([n is not None and n <= most for n in waits]) for most in frames]
+            name = f"{in_words(method).removesuffix(', cold start')} ({len(waits)})"
+            axis.step(frames, 100 * np.array(share), where="post", lw=1.3, label=name)
+        axis.set(title=title, xlabel="frames", ylim=(0, 102), xlim=(0, 60))
+        axis.title.set_fontsize(8)
+        axis.grid(alpha=0.3, lw=0.5)
+        axis.legend(fontsize=6.5, frameon=False, loc="lower right")
+        axis.spines[["top", "right"]].set_visible(False)
+    figure.axes[0].set_ylabel("found [% of recordings]")
+    return figure
 
 
 def draw_joints(scores: dict[str, Any]) -> Figure:

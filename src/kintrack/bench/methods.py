@@ -15,7 +15,7 @@ from numpy import ndarray
 from kintrack.bench.cases import ALONE, CLEAN, GAPS, REAL, ROOM, SCENES, Case
 from kintrack.bench.rgb import regress
 from kintrack.calibration.config import BodyConfig
-from kintrack.config import TrackerConfig
+from kintrack.config import AssociationConfig, TrackerConfig
 from kintrack.errors import ConfigError
 from kintrack.fit import fit_sequence
 from kintrack.geometry import camera_pose
@@ -32,8 +32,11 @@ BEFORE_S = 1.0 / 30.0
 """How long before the recording a tracker that starts warm is started [s]."""
 GEOMETRY, TRUE_LABELS, RGB, NETWORK = "geometry", "true_labels", "rgb", "network"
 COLD, NO_TARGETS, CALIBRATED = "_cold", "_no_targets", "_calibrated"
+HARD = "_hard_gates"
 OFF = PullConfig(sigma_m=1e6)
 """A pull of no weight."""
+HARD_GATES = AssociationConfig(part_m=10.0, doubt_m=0.0)
+"""A vertex pairs with pixels of its own label alone, and the network's doubt is not asked."""
 HARDEST = "30 cm"
 """Where rivals that start cold are compared."""
 
@@ -55,6 +58,9 @@ class Method:
     """Whether it is what this project does: the first network."""
     targets: bool = True
     """Whether rough places of the parts pull while tracking."""
+    soft: bool = True
+    """Whether a vertex may pair with pixels of other labels at a price, and doubtful pixels go to
+    the second label; else gates are as hard as in [Wan19]."""
     calibrated: bool = False
     """Whether it gets to know the person, as `kintrack fit` does; the others track the average
     adult in the size of the first frame."""
@@ -62,8 +68,10 @@ class Method:
     def runs_on(self, case: Case) -> bool:
         """Whether the bench asks it about a recording."""
         if not self.targets:
-            gap = not self.cold and case.condition in GAPS
-            return case.group == ROOM and (gap or case.condition == HARDEST)
+            warm = not self.cold and case.condition in (CLEAN, *GAPS)
+            return case.group == ROOM and (warm or case.condition == HARDEST)
+        if not self.soft:
+            return case.group == ROOM and case.condition in (CLEAN, HARDEST)
         if self.calibrated:
             warm = case.group == ROOM and case.condition not in GAPS and not self.cold
             return warm or case.group == SCENES and self.cold and self.main
@@ -114,13 +122,12 @@ def methods_of(weights: Mapping[str, Path], chosen: Sequence[str] = ()) -> tuple
         warm.append(Method(own + NO_TARGETS, NETWORK, weights[own], targets=False))
         warm += [replace(m, name=m.name + CALIBRATED, calibrated=True) for m in warm
                  if m.targets and (m.main or m.kind == TRUE_LABELS)]  # fmt: skip
-    known = {
-        method.name: method
-        for one in warm
-        for method in (one, replace(one, name=one.name + COLD, cold=True))
-    }
-    known[RGB] = Method(RGB, RGB)
-    if len(known) < 2 * len(warm) + 1:
+    every = [m for one in warm for m in (one, replace(one, name=one.name + COLD, cold=True))]
+    if own is not None:
+        every.append(Method(own + HARD, NETWORK, weights[own], soft=False))
+    every.append(Method(RGB, RGB))
+    known = {method.name: method for method in every}
+    if len(known) < len(every):
         raise ConfigError(f"weights {', '.join(weights)}: a name is that of another method")
     unknown = sorted(set(chosen) - set(known))
     if unknown:
@@ -143,13 +150,19 @@ def run_method(method: Method, task: Task, on_frame: Callable[[], None]) -> None
     fit_sequence(
         sequence,
         task.result,
-        TrackerConfig() if method.targets else TrackerConfig(pull=OFF),
+        _config(method),
         T_world_camera=camera_pose(task.case.pitch_deg),
         on_frame=lambda frame, found: on_frame(),
         begun=None if method.cold else _begun(task.clean),
         segmenter=_segmenter(method),
         body=BodyConfig("calibrated" if method.calibrated else "template"),
     )
+
+
+def _config(method: Method) -> TrackerConfig:
+    if not method.targets:
+        return TrackerConfig(pull=OFF)
+    return TrackerConfig() if method.soft else TrackerConfig(association=HARD_GATES)
 
 
 def _begun(clean: Case) -> tuple[Frame, Float[ndarray, "j 3"]]:

@@ -57,7 +57,7 @@ class Fitting:
         """Tells whether a kept result is still valid."""
         method, task = self.method, self.task
         recordings = (task.case.fingerprint(), "" if method.cold else task.clean.fingerprint())
-        how = (method.cold, method.targets, method.calibrated)
+        how = (method.cold, method.targets, method.calibrated, method.soft)
         return result_digest(method.kind == RGB, method.weights, how, recordings)
 
     def is_done(self) -> bool:

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from kintrack.bench.cases import GAPS, OBJECTS, REAL, ROOM, SCENE
-from kintrack.bench.methods import CALIBRATED, COLD, GEOMETRY, RGB, TRUE_LABELS
+from kintrack.bench.cases import CLEAN, GAPS, OBJECTS, REAL, ROOM, SCENE
+from kintrack.bench.methods import CALIBRATED, COLD, GEOMETRY, NO_TARGETS, RGB, TRUE_LABELS
 from kintrack.bench.segmentation.tables import Grid
 from kintrack.bench.tables import LOCK_FRAMES, RECOVER_FRAMES, within
 
@@ -27,7 +27,7 @@ class Target(NamedTuple):
     at_least: bool
     """Whether more is better."""
     unit: str
-    """`cm`, `%`, `points` or `frames`."""
+    """`cm`, `mm`, `%`, `points` or `frames`."""
 
     @property
     def passed(self) -> bool | None:
@@ -88,6 +88,11 @@ def targets(content: dict[str, Any]) -> list[Target]:
     ):
         says = f"true joints within their 95 % ellipsoid, {what} of the distances"
         out.append(Target(says, measured, limit, at_least, "%"))
+    both = [scores.get(name, {}).get(ROOM, {}).get(CLEAN) for name in (own, own + NO_TARGETS)]
+    with_mm, without_mm = (_mm(found) for found in both)
+    effect = None if with_mm is None or without_mm is None else abs(with_mm - without_mm)
+    says = "effect of the targets on the mean error while tracking, no object"
+    out.append(Target(says, effect, 2.0, False, "mm"))
     starts = [n for found in cold.values() for n in found["locked_after"]]
     out.append(Target(f"cold starts found within {LOCK_FRAMES} frames",
                       _share(starts, LOCK_FRAMES), 99.0, True, "%"))  # fmt: skip
@@ -113,6 +118,11 @@ def targets(content: dict[str, Any]) -> list[Target]:
 def _cm(found: dict[str, Any] | None, part: str) -> float | None:
     mean = None if found is None else found[part]["mean_m"]
     return None if mean is None else 100.0 * mean
+
+
+def _mm(found: dict[str, Any] | None) -> float | None:
+    cm = _cm(found, "all")
+    return None if cm is None else 10.0 * cm
 
 
 def _within(found: dict[str, Any] | None) -> float | None:
