@@ -80,15 +80,18 @@ class Memory:
 
     def _meet(self, human: Human) -> None:
         """Take this person's body and what belongs to it."""
-        self._met = human
-        self.surface = met(self.surface, human, self.config.deformation)
-        self.human = self._fitted = human
-        if self.surface is not None:
-            self.human, self._fitted = self.surface.shown(human), self.surface.fitted(human)
+        self._met = self.human = self._fitted = human
+        self._wear(met(self.surface, human, self.config.deformation))
         self._resting = posed(human.body, RESTING_DEG)
         self._legs = load_leg_prior(human.body, self.config.prior)
         self._prior_sigma = prior_sigma(human.body, self.config.prior)
         self._soles = soles_of(human)
+
+    def _wear(self, surface: Surface | None) -> None:
+        """Take a surface of this person; None for none."""
+        self.surface = surface
+        if surface is not None:
+            self.human, self._fitted = surface.shown(self._met), surface.fitted(self._met)
 
     @property
     def in_doubt(self) -> bool:

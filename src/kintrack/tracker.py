@@ -111,14 +111,16 @@ class Tracker(Memory):
         return self.amended[-1]
 
     def _challenged(self, frame: Frame, result: FrameResult) -> list[Duel]:
-        """Let rivals, who have none themselves, begin where the track is."""
+        """Let rivals, who have none themselves, begin where the track is, in the same clothes."""
         rules, duels = self.config.rival, []
-        alone = replace(self.config, rival=replace(rules, most_frames=0))
+        kept = replace(self.config.deformation, reset_when_lost=False)
+        alone = replace(self.config, rival=replace(rules, most_frames=0), deformation=kept)
         for challenge in challenges(result, rules):
             told = None if self.segmenter is None else Told(self.segmenter)
             human, T = self._met, self.T_world_camera
             rival = Tracker(alone, human, T, segmenter=told, labelled=self.labelled)
             rival._where, rival._ground = self._where, self._ground
+            rival._wear(self.surface)
             duels.append(Duel.begun(rival, challenge, frame, rules))
         return [duel for duel in duels if duel is not None]
 

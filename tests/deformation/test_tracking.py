@@ -63,6 +63,18 @@ def test_without_deformation_nothing_is_raised(quick, human, recording):
     assert tracker.human is human
 
 
+def test_a_rival_wears_what_the_track_has_learnt(config, human, recording):
+    tracker = Tracker(config, human)
+    results = [tracker.step(frame) for frame in recording[:12]]
+    learnt = tracker.surface.offsets_m
+    assert learnt.max() > 0.5 * FOLD_M
+    duels = tracker._challenged(recording[11], results[-1])
+    assert duels
+    for duel in duels:
+        worn = duel.rival.surface.offsets_m
+        assert np.abs(worn - learnt).mean() < 0.2 * np.abs(learnt).mean()
+
+
 def test_two_runs_give_the_same_bits(config, human, recording, tracked):
     tracker = Tracker(config, human)
     for frame, before in zip(recording[:4], tracked[1], strict=False):
