@@ -4,7 +4,10 @@
 import json
 import os
 import signal
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -137,6 +140,25 @@ def test_the_command_packs_trains_and_says_what_it_learnt_from(tmp_path):
     (tmp_path / "none").mkdir()
     with pytest.raises(DatasetError, match="none holds no recording"):
         Train((tmp_path / "none",), tmp_path / "other", config=config).run()
+
+
+def test_two_processes_train_one_network(tmp_path):
+    for n in range(2):
+        record(tmp_path / f"mine/r{n}", frames=2, seed=n)
+    command = [str(Path(sys.executable).with_name("kintrack")), "train", "mine", "-o", "run"]
+    options = ("--steps 2 --batch 2 --workers 0 --threads 1 --device cpu --precision fp32 "
+               "--bank.cutouts 0 --bank.rooms 0 --network.widths 4 6 8 8").split()  # fmt: skip
+    launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node"]
+    done = subprocess.run(
+        [*launch, "2", "--", *command, *options],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    training = load_weights(tmp_path / "run/weights.safetensors").training
+    assert training["processes"] == 2 and training["steps"] == 2
 
 
 def test_another_run_in_the_folder_is_named(data, whole_run):
