@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A start that exchanges sides is found out, and what was said of it is amended."""
 
+from concurrent.futures import Future
 from dataclasses import replace
 
 import numpy as np
@@ -107,6 +108,29 @@ def test_a_track_that_began_on_exchanged_legs_is_put_right_and_amended(scene, un
     assert off(results[0], 0) > 0.12
     assert len(tracker.amended) == len(results)
     assert max(off(result, i) for i, result in enumerate(tracker.amended)) < 0.05
+
+
+class OneAfterTheOther:
+    """Threads that are none: what is submitted is done at once."""
+
+    @staticmethod
+    def submit(do, *arguments):
+        done = Future()
+        done.set_result(do(*arguments))
+        return done
+
+
+def test_rivals_beside_the_track_find_what_they_find_one_after_the_other(
+    movie, unsized, mistaken, monkeypatch
+):
+    beside = Tracker(unsized)
+    both = [(beside.step(frame), beside.amended) for frame in movie]
+    monkeypatch.setattr(kintrack.tracker, "other_cores", OneAfterTheOther)
+    alone = Tracker(unsized)
+    for frame, (result, amended) in zip(movie, both, strict=True):
+        again = alone.step(frame)
+        assert again.q.tobytes() == result.q.tobytes()
+        assert [r.q.tobytes() for r in alone.amended] == [r.q.tobytes() for r in amended]
 
 
 def test_legs_of_which_one_is_not_seen_are_not_exchanged(scene, movie, unsized):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,6 +40,17 @@ FRAME_OF_JOINT = {
 """Reported joint centre -> URDF frame whose origin it is. `neck` is the base of the skull."""
 
 
+class Scratch(threading.local):
+    """Pinocchio's work space, one for each thread, so that tracks may be followed side by side."""
+
+    def __init__(self, model: pin.Model):
+        """Make the present thread's; every other thread's is made when it first asks."""
+        self.model, self.data = model, model.createData()
+
+    def __reduce__(self) -> tuple[type[Scratch], tuple[pin.Model]]:
+        return Scratch, (self.model,)
+
+
 @dataclass(frozen=True)
 class Body:
     """Kinematic tree with a free-flyer root; q is (x y z, qx qy qz qw, hinges), v is (48,)."""
@@ -59,7 +71,7 @@ class Body:
     """Upper bound per velocity component [rad]; inf for the root."""
     joint_support: Bool[ndarray, "j nv"]
     """True where a velocity component moves a reported joint."""
-    scratch: pin.Data
+    scratch: Scratch
     """Work space of `run_kinematics`; what it computes is copied out."""
 
     @property
@@ -173,7 +185,7 @@ def rigged_body(folder: Path, rig: Rig) -> Body:
         lower=lower,
         upper=upper,
         joint_support=_support(model, [model.frames[int(f)].parentJoint for f in frames]),
-        scratch=model.createData(),
+        scratch=Scratch(model),
     )
 
 
@@ -238,7 +250,7 @@ def run_kinematics(body: Body, q: Float[ndarray, " nq"]) -> BodyState:
     Returns:
         A state whose poses are current.
     """
-    model, data = body.model, body.scratch
+    model, data = body.model, body.scratch.data
     J_world = pin.computeJointJacobians(model, data, q)
     pin.updateFramePlacements(model, data)
     Ts = np.empty((len(body.link_joints), 4, 4))

@@ -9,7 +9,7 @@ from numba import njit
 from numpy import ndarray
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def components(
     z: Float[ndarray, "h w"], valid: Bool[ndarray, "h w"], edge_m: float, noise: float
 ) -> Int[ndarray, "h w"]:

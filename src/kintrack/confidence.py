@@ -69,7 +69,7 @@ def _shared_gradients(state: BodyState, surface: SurfaceResidual) -> Float[ndarr
     return G.reshape(state.body.nv, -1)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _shared_blocks(Ts, links, skin_weights, points, A, weights):
     """Force and torque on link b of a unit shift of the pairs of link l, (L, L, 6, 3)."""
     count = Ts.shape[0]

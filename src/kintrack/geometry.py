@@ -96,7 +96,7 @@ class PinholeCamera:
         )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _back_project(depth, fx, fy, cx, cy):
     h, w = depth.shape
     out = np.zeros((h, w, 3))

@@ -163,7 +163,7 @@ def label_agreement(counts: Int[ndarray, "7 7"]) -> float:
     return float(np.trace(on_person) / total) if total else float("nan")
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _count(skin, part, z, labels, fx, fy, cx, cy, kinds):
     out = np.zeros((kinds, kinds), dtype=np.int64)
     h, w = z.shape

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -70,6 +71,7 @@ class Memory:
         """What the last frames should have been, if the last step found sides exchanged; that
         step's own result is the last of them."""
         self._duels: list[Duel] = []
+        self._taken: list[Future[None]] = []
         self._vigil = Vigil(self.config.rival)
         self._life, self._where, self._ground = Life(), Whereabouts(), Ground()
         self._failed_s = -np.inf

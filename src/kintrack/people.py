@@ -240,7 +240,7 @@ def _parts(labels: UInt8[ndarray, "h w"], z: Float[ndarray, "h w"], most_m: floa
     return np.where(good, labels, np.uint8(0))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _cores(z, label, edge):
     h, w = z.shape
     out = np.zeros((h, w), dtype=np.bool_)

@@ -33,7 +33,7 @@ def rasterise(
     return depth, index
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _fill(v, faces, fx, fy, cx, cy, depth, index):
     h, w = depth.shape
     pu = np.empty(v.shape[0])

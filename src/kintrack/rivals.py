@@ -11,8 +11,11 @@ the one whose skin fits best stays: when a track begins, and when it becomes dou
 
 from __future__ import annotations
 
+import os
 from collections import deque
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -29,6 +32,8 @@ from kintrack.sequence.frame import Frame
 if TYPE_CHECKING:
     from kintrack.tracker import Tracker
 
+SIDE_BY_SIDE = 2
+"""Threads in which rivals are followed beside the track."""
 OTHER_SIDE = {"l": "r", "r": "l"}
 BELOW_HIP = ("knee", "ankle", "foot")
 
@@ -105,15 +110,17 @@ class Duel:
             return None
         return cls(rival, challenge, config, [first], []) if rival.tracks else None
 
-    def step(self, frame: Frame, tracks: bool, reading: Reading | None) -> Verdict:
-        """Let the rival take the frame that the track has just taken.
+    def step(self, frame: Frame) -> None:
+        """Let the rival take a frame, before, after or while the track does."""
+        self.results.append(self.rival.step(frame))
+
+    def verdict(self, tracks: bool, reading: Reading | None) -> Verdict:
+        """What the frame that both have taken decides.
 
         Args:
-            frame: The frame.
             tracks: Whether the track still has a pose.
             reading: What the frame said of it.
         """
-        self.results.append(self.rival.step(frame))
         other, c = self.rival.reading, self.config
         if not (tracks and self.rival.tracks):
             return Verdict(True, self.rival.tracks and self._ahead(self.challenge.wins_late))
@@ -135,6 +142,15 @@ class Duel:
     def _ahead(self, factor: float = 1.0) -> bool:
         """Whether the rival's doubt is smaller than so many times the track's."""
         return bool(self.doubts_m2) and factor * self.advantage > 1.0
+
+
+@cache
+def other_cores() -> ThreadPoolExecutor:
+    """Threads for rivals; what they find does not depend on when they do."""
+    return ThreadPoolExecutor(max_workers=SIDE_BY_SIDE, thread_name_prefix="kintrack-rival")
+
+
+os.register_at_fork(after_in_child=other_cores.cache_clear)
 
 
 class Vigil:

@@ -77,7 +77,7 @@ def settle_doubts(observation: Observation, view: View, doubt_m: float) -> Obser
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _nearest_part(
     points: Float[ndarray, "h w 3"],
     wanted: Bool[ndarray, "h w"],
@@ -109,7 +109,7 @@ def _nearest_part(
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _drop_islands(
     z: Float[ndarray, "h w"], region: Bool[ndarray, "h w"], claims: Bool[ndarray, "h w"]
 ) -> None:

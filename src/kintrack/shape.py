@@ -212,7 +212,7 @@ def _turns(state: BodyState, space: ShapeSpace) -> Float[ndarray, "l 3 3"]:
     return np.ascontiguousarray(state.Ts_world_link[:, :3, :3] @ R_link_root)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _jacobians(turn, moved, origins, basis, vertex, all_links, all_weights):
     count, n = basis.shape[0], vertex.shape[0]
     links, weights = all_links[vertex], all_weights[vertex]

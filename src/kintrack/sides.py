@@ -59,7 +59,7 @@ def settle_sides(
     return replace(observation, labels=np.where(observation.region, settled, labels))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _settle(points, labels, skin, part, margin):
     h, w = labels.shape
     out = labels.copy()

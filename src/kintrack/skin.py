@@ -118,7 +118,7 @@ def _rows(skin: Skin, vertex: ndarray) -> tuple[ndarray, ndarray, ndarray]:
     return skin.links[vertex], skin.weights[vertex], skin.points_link[vertex]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _blend(Ts, links, weights, points):
     out = np.zeros((links.shape[0], 3))
     for i in range(links.shape[0]):
@@ -133,7 +133,7 @@ def _blend(Ts, links, weights, points):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _normals(vertices, faces):
     out = np.zeros_like(vertices)
     for f in range(faces.shape[0]):
@@ -158,7 +158,7 @@ def _normals(vertices, faces):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _jacobians(Ts, J, support, links, weights, points):
     n, nv = links.shape[0], J.shape[1]
     out = np.zeros((n, 3, nv))

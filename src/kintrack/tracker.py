@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import wait
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +29,7 @@ from kintrack.person import own_pixels, part_pull
 from kintrack.reporting import coasted_result, fitted_result, reading_of
 from kintrack.residuals.prior import TangentPrior, diagonal_prior
 from kintrack.result import FrameResult
-from kintrack.rivals import Duel, Vigil, challenges
+from kintrack.rivals import Duel, Vigil, challenges, other_cores
 from kintrack.segmenter import Told, checked_labels, region_of
 from kintrack.sequence.frame import Frame, readable
 from kintrack.settling import settle
@@ -56,9 +57,12 @@ class Tracker(Memory):
         with self._threads.limit(limits=1, user_api="blas"):
             if not self.tracks:
                 self._vigil = Vigil(self.config.rival)
-            self.amended, frame = (), readable(frame)
-            result = self._step(frame)
-            return self._settled(frame, result) if self.config.rival.most_frames else result
+            self.amended, frame, self._taken = (), readable(frame), []
+            try:
+                result = self._step(frame)
+                return self._settled(frame, result) if self.config.rival.most_frames else result
+            finally:
+                wait(self._taken)
 
     def begin(self, frame: Frame, joints_camera: Float[ndarray, "j 3"]) -> FrameResult:
         """Start from joints that somebody else has found roughly, whatever the fit says of them.
@@ -92,7 +96,9 @@ class Tracker(Memory):
         """The frame's result, or that of a rival who stays."""
         began, winner = time.perf_counter(), None
         if self._duels:
-            told = [(duel, duel.step(frame, self.tracks, self.reading)) for duel in self._duels]
+            for taken in self._taken:
+                taken.result()
+            told = [(duel, duel.verdict(self.tracks, self.reading)) for duel in self._duels]
             won = [duel for duel, verdict in told if verdict.won]
             winner = max(won, key=lambda duel: duel.advantage, default=None)
             self._duels = [] if won else [duel for duel, verdict in told if not verdict.over]
@@ -112,7 +118,7 @@ class Tracker(Memory):
 
     def _challenged(self, frame: Frame, result: FrameResult) -> list[Duel]:
         """Let rivals, who have none themselves, begin where the track is, in the same clothes."""
-        rules, duels = self.config.rival, []
+        rules, begun = self.config.rival, []
         kept = replace(self.config.deformation, reset_when_lost=False)
         alone = replace(self.config, rival=replace(rules, most_frames=0), deformation=kept)
         for challenge in challenges(result, rules):
@@ -121,16 +127,18 @@ class Tracker(Memory):
             rival = Tracker(alone, human, T, segmenter=told, labelled=self.labelled)
             rival._where, rival._ground = self._where, self._ground
             rival._wear(self.surface)
-            duels.append(Duel.begun(rival, challenge, frame, rules))
-        return [duel for duel in duels if duel is not None]
+            begun.append(other_cores().submit(Duel.begun, rival, challenge, frame, rules))
+        return [duel for duel in (found.result() for found in begun) if duel is not None]
 
     def _step(self, frame: Frame) -> FrameResult:
         began, self.reading = time.perf_counter(), None
         if frame.problem is not None or frame.depth_m is None:
+            self._send(frame)
             return self._nothing(frame, "skipped", began, frame.problem or "no depth")
         config, a, now_s = self.config, self.config.association, frame.timestamp_s
         awaited = awaited_state(self._fitted.body, self.belief, now_s, config.motion)
         observation = self._observe(frame, awaited)
+        self._send(frame)
         if not observation.points_camera[..., 2].any():
             return self._nothing(frame, "skipped", began, "no depth reading")
         observation, self._where = own_pixels(
@@ -177,6 +185,10 @@ class Tracker(Memory):
         except AssociationError:
             return self._miss(frame, seen, began)
         return self._report(frame, seen, fit, priors, unseen, hidden, began)
+
+    def _send(self, frame: Frame) -> None:
+        """Let rivals take the frame, whose labels are known by now, beside the track."""
+        self._taken = [other_cores().submit(duel.step, frame) for duel in self._duels]
 
     def _observe(self, frame: Frame, awaited: BodyState | None = None) -> Observation:
         """Points of a frame, with labels if there is a segmenter."""

@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from kintrack.body import run_kinematics
+from kintrack.body import Scratch, run_kinematics
 from kintrack.errors import ModelError
 from kintrack.human import load_human
 from kintrack.solver.symbolic_body import joint_origins, symbolic_body, tree_of
@@ -93,4 +93,4 @@ def model_of(*joints):
 def test_a_body_of_other_joints_is_refused(body, joints, says):
     model = model_of(*joints)
     with pytest.raises(ModelError, match=says):
-        tree_of(replace(body, model=model, scratch=model.createData()))
+        tree_of(replace(body, model=model, scratch=Scratch(model)))

@@ -52,7 +52,7 @@ def hidden_vertices(
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _hidden(v, visible, part, points, labels, has_background, fx, fy, cx, cy, nearer):
     h, w = labels.shape
     out = np.zeros(v.shape[0], dtype=np.bool_)

@@ -81,7 +81,7 @@ def box_around(vertices_camera: Float[ndarray, "v 3"], margin_m: float) -> Float
     return np.stack([low - margin_m, high + margin_m])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _inside(points, region, box):
     h, w = region.shape
     out = np.zeros((h, w), dtype=np.bool_)

@@ -48,7 +48,7 @@ def visible_vertices(
     )
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _visible(v, n, fx, fy, cx, cy, depth, facing, tolerance):
     h, w = depth.shape
     out = np.zeros(v.shape[0], dtype=np.bool_)

@@ -133,8 +133,8 @@ def _ask(
 
 @cache
 def _second_core() -> ThreadPoolExecutor:
-    """One thread for the window search, which runs beside the tree search."""
-    return ThreadPoolExecutor(max_workers=1, thread_name_prefix="kintrack-window")
+    """Threads for the window search, which runs beside the tree search."""
+    return ThreadPoolExecutor(max_workers=2, thread_name_prefix="kintrack-window")
 
 
 os.register_at_fork(after_in_child=_second_core.cache_clear)

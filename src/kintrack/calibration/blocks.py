@@ -178,7 +178,7 @@ def surface_of(
     ).joined(outline)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _rooted(roots, weights, J_pose, J_shape, offsets):
     """Rows sqrt(w_i) A_i [J_pose, J_shape] of all pairs, and sqrt(w_i) A_i d_i."""
     n, m, k = J_pose.shape[0], J_pose.shape[2], J_shape.shape[2]

@@ -84,7 +84,7 @@ def evidence_of(
     return Evidence(face, a, r, tukey_weights(r, scale) * cosine)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _compare(v, d, faces, part, index, points, wanted, labelled, fx, fy, cx, cy, gate, beyond):
     h, w = index.shape
     most = np.count_nonzero(wanted)
@@ -121,7 +121,7 @@ def _compare(v, d, faces, part, index, points, wanted, labelled, fx, fy, cx, cy,
     return face[:count], a[:count], r[:count], cosine[:count]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _nearest_hit(index, y, x, beyond):
     """Pixel that sees the skin, this one or the nearest; -1, -1 if none is near enough."""
     if index[y, x] >= 0:
@@ -136,12 +136,12 @@ def _nearest_hit(index, y, x, beyond):
     return ry, rx
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _has_label(part, corners, label):
     return part[corners[0]] == label or part[corners[1]] == label or part[corners[2]] == label
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _meet(v, corners, qx, qy, n, s, b):
     """Normal, point and barycentric coordinates where a ray meets a triangle, and their cosine."""
     o, p, q = v[corners[0]], v[corners[1]], v[corners[2]]

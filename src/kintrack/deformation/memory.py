@@ -54,7 +54,7 @@ def remembered(
     return H, g
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add(H, g, face, a, r, weight, faces, o, kept):
     seen = np.zeros(H.shape[0], dtype=np.bool_)
     for i in range(face.shape[0]):

@@ -39,7 +39,7 @@ def smoothed(
     return _solve(offsets_m, _with_edges(H, 0.5 * smooth), g, faces, hold, iterations)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _with_edges(H, k):
     out = H.copy()
     for f in range(H.shape[0]):
@@ -50,7 +50,7 @@ def _with_edges(H, k):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _solve(start, H, g, faces, hold, iterations):
     x = start.copy()
     diagonal = np.full(len(x), hold)
@@ -77,7 +77,7 @@ def _solve(start, H, g, faces, hold, iterations):
     return x
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _times(H, faces, hold, x):
     y = hold * x
     for f in range(faces.shape[0]):

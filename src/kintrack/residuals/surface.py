@@ -180,7 +180,7 @@ def plane_roots(n: Float[ndarray, "n 3"], alpha: float) -> Float[ndarray, "n 3 3
     return _fill_roots(n, np.sqrt(alpha), np.sqrt(1 + alpha) - np.sqrt(alpha))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _fill_roots(n, base, gain):
     out = np.empty((n.shape[0], 3, 3))
     for i in range(n.shape[0]):
@@ -191,7 +191,7 @@ def _fill_roots(n, base, gain):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _apply(A, d):
     out = np.empty_like(d)
     for i in range(d.shape[0]):
@@ -200,7 +200,7 @@ def _apply(A, d):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _apply_rows(A, J):
     out = np.empty_like(J)
     for i in range(J.shape[0]):
@@ -212,7 +212,7 @@ def _apply_rows(A, J):
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _cost(Ts, links, skin_weights, points, vertex, observed, A, weights):
     total = 0.0
     d = np.empty(3)
@@ -236,7 +236,7 @@ def _cost(Ts, links, skin_weights, points, vertex, observed, A, weights):
     return 0.5 * total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _link_blocks(Ts, links, skin_weights, points, observed, A, weights):
     """M_bc (L, L, 6, 6), the links' gradient h (L, 6) and the cost, summed over the pairs."""
     count = Ts.shape[0]

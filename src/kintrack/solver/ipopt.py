@@ -12,6 +12,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -40,6 +41,8 @@ STATUS: dict[str, Status] = {
 }
 """IPOPT's words -> ours."""
 log = logging.getLogger(__name__)
+_alone = Lock()
+"""IPOPT's linear solver is not made for several threads at once."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,7 @@ def minimise(
     given = parameters(start, residuals, together)
     if not np.isfinite(given.packed()).all():
         return Outcome(begun, "not finite", "a term or the start holds NaN or infinity")
-    with signals_put_off():
+    with _alone, signals_put_off():
         ran = _run(body, start, given, together, max(steps, LEAST_ITERATIONS))
     end = begun
     if np.isfinite(ran.q).all():

@@ -175,7 +175,7 @@ def _sum_priors(
     return places, Q, g, constant
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _bond(together, links, weights):
     """Mark the links of every vertex as sharing it."""
     for i in range(links.shape[0]):
@@ -185,7 +185,7 @@ def _bond(together, links, weights):
                     together[links[i, a], links[i, b]] = True
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add_pairs(Q, g, links, shares, points, observed, roots, weights):
     """Add w_i |A_i (T b_i - p_i)|^2 / 2 of pairs to Q (upper part, t = vec T) and g."""
     constant = 0.0

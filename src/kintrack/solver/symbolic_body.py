@@ -45,7 +45,7 @@ def tree_of(body: Body) -> Tree:
     Raises:
         ModelError: if the root is no free-flyer or another joint is no hinge of one angle.
     """
-    model, data = body.model, body.scratch
+    model, data = body.model, body.scratch.data
     pin.computeJointJacobians(model, data, pin.neutral(model))
     if model.njoints < 2 or model.joints[1].nq != 7:
         raise ModelError("the symbolic body needs a free-flyer as its first joint")

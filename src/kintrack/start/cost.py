@@ -30,7 +30,7 @@ NEAR_M = 0.05
 """Skin this far behind what is seen is still taken to be seen [m]."""
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def place(
     points, weights, ends, skins, normals, eye, R, shift,
     intrinsics, depth, away, labels, has_background, each, side2, turns, t, choice,
@@ -84,7 +84,7 @@ def place(
     return cost, unrest
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def mismatch(
     points, weights, ends, owner, skins, normals, chosen, t, eye, R, shift,
     intrinsics, depth, away, labels, has_background, each, side2,
@@ -107,7 +107,7 @@ def mismatch(
     return cost / weights.sum()
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _range(ends, k):
     """First and last point that part k may own: its kind's."""
     if k < 2:
@@ -116,7 +116,7 @@ def _range(ends, k):
     return ends[first], ends[first + 2]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _unrest(weights, owner, low, high, k, posture):
     """What it costs a limb not to be at rest."""
     if posture == 0:
@@ -128,7 +128,7 @@ def _unrest(weights, owner, low, high, k, posture):
     return AT_REST_M2 * area + UNSEEN_M4 * max(1.0 - area / UNSEEN_M2, 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _roughly(points, weights, ends, skins, eye, trunk):
     """The translation that brings the middles together, a hand's breadth behind the surface."""
     t, mass = np.zeros(3), 0.0
@@ -147,7 +147,7 @@ def _roughly(points, weights, ends, skins, eye, trunk):
     return t + 0.08 * behind / np.sqrt((behind**2).sum())
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _shifted(points, weights, ends, owner, skins, normals, chosen, t, eye, parts):
     """The translation after one closest-point step over the first parts."""
     step, mass = np.zeros(3), 0.0
@@ -168,7 +168,7 @@ def _shifted(points, weights, ends, owner, skins, normals, chosen, t, eye, parts
     return t + step / mass if mass > 0.0 else t
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _take_sides(points, ends, owner, skins, normals, chosen, t, eye, side2):
     """Give every point of a limb to the side that suits it better at the price of a wrong label."""
     d = np.full((2, len(points)), CAP_M * CAP_M)
@@ -186,7 +186,7 @@ def _take_sides(points, ends, owner, skins, normals, chosen, t, eye, side2):
             owner[i] = other if d[other % 2, i] + side2 < d[k % 2, i] else k
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _nearest(x, v, n, t, eye):
     """Nearest vertex that faces the eye, -1 if none does, and its squared distance."""
     best, at = np.inf, -1
@@ -201,7 +201,7 @@ def _nearest(x, v, n, t, eye):
     return at, best
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _part_cost(
     points, weights, owner, low, high, v, n, t, eye, R, shift,
     intrinsics, depth, away, labels, has_background, k, each, side2, most,
