@@ -182,12 +182,13 @@ def _section(files: dict[str, Path], steps: int, seed: int) -> str:
     """Markdown of the section."""
     facts: dict[str, Any] = {name: load_weights(path).training for name, path in files.items()}
     rows = [
-        [name.replace("_", " "), f"{said['config']['background_weight']:g}",
+        [name.replace("_", " "), _widths(said), f"{said['config']['background_weight']:g}",
          f"{said['config']['augment']['inserted']:g}", f"{said['hours']:.2f}",
          *(f"{100 * said['validation'][key]:.1f}" for key in COLUMNS)]
         for name, said in facts.items()
     ]  # fmt: skip
-    header = ["run", "lambda", "objects inserted", "hours", *(c.replace("_", " ") for c in COLUMNS)]
+    header = ["run", "widths", "lambda", "objects inserted", "hours",
+              *(c.replace("_", " ") for c in COLUMNS)]  # fmt: skip
     first = next(iter(facts.values()))
     told = report.conditions(
         data=f"{', '.join(first['data'])}: {first['training_pictures']} pictures train, "
@@ -206,6 +207,11 @@ All networks on the same data for {steps} steps, scores [%] on people whom train
 
 {report.bullets(told)}
 """
+
+
+def _widths(said: dict[str, Any]) -> str:
+    """Channels from the finest to the coarsest level."""
+    return "/".join(str(width) for width in said["config"]["network"]["widths"])
 
 
 def _figure(files: dict[str, Path]) -> Figure:
