@@ -87,7 +87,8 @@ def region_of_person(
         focal_px: Focal length [px].
 
     Returns:
-        The region; None if no patch is larger than `LEAST_AREA_M2`.
+        The region; None if no patch is larger than `LEAST_AREA_M2`, or the largest has nothing near
+        its own middle and depth: a ring around somebody else.
     """
     (h, w), (r, c) = depth_m.shape, labels.shape
     rows, columns = (2 * np.arange(r) + 1) * h // (2 * r), (2 * np.arange(c) + 1) * w // (2 * c)
@@ -101,6 +102,8 @@ def region_of_person(
     v, u = np.nonzero(person & (np.abs(depth - own) < BEHIND_M))
     middle_v, middle_u = (np.median(x) for x in np.nonzero(patch))
     near = np.hypot(v - middle_v, u - middle_u) * cell_m < REACH_M
+    if not near.any():
+        return None
     low, high = np.percentile(np.stack([u, v])[:, near], (2, 98), axis=1)
     center = 0.5 * (low + high)
     return Region(

@@ -90,3 +90,11 @@ def test_a_tracked_body_says_where_she_is():
     assert found.center_px == pytest.approx((255.5, 211.5)) and found.depth_m == 2.0
     assert region_of(np.array([[0.0, 0.0, -1.0]]), camera) is None
     assert region_of(np.array([[9.0, 0.0, 1.0]]), camera) is None
+
+
+def test_a_patch_with_nothing_near_its_middle_is_nobody():
+    """Two boards side by side, joined by their labels, far apart in depth."""
+    labels, depth = np.zeros((60, 80), np.uint8), np.full((60, 80), 5.0, np.float32)
+    labels[10:50, 20:60] = 2
+    depth[10:50, 20:40], depth[10:50, 40:60] = 2.0, 6.0
+    assert region_of_person(labels, depth, 70.0) is None
