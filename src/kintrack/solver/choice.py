@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.util import find_spec
 from typing import Protocol
 
 from kintrack.body import Body, BodyState
@@ -36,14 +37,10 @@ def check_installed(method: str) -> None:
     """Pass if a solver can run here.
 
     Raises:
-        ConfigError: if IPOPT is wanted and CasADi, which brings it, cannot be imported.
+        ConfigError: if IPOPT is wanted and CasADi, which brings it, is not installed.
     """
-    if method != "ipopt":
-        return
-    try:
-        import casadi  # noqa: F401
-    except ImportError as error:
+    if method == "ipopt" and find_spec("casadi") is None:
         raise ConfigError(
-            f"solver 'ipopt' needs CasADi ({error}); pip install 'kintrack[ipopt]', or take "
-            "'gauss-newton'"
-        ) from error
+            "solver 'ipopt' needs CasADi, which is not installed; pip install 'kintrack[ipopt]', "
+            "or take 'gauss-newton'"
+        )
