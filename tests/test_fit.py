@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import av
 import numpy as np
 import pytest
 
-from kintrack.config import StartConfig
-from kintrack.errors import ResultError
+from kintrack.config import SolverConfig, StartConfig, TrackerConfig
+from kintrack.errors import ConfigError, ResultError
 from kintrack.fit import Outputs, caption, fit_sequence, load_person, posed_skin
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, camera_pose
 from kintrack.joints import JOINT_NAMES
@@ -52,6 +53,17 @@ def fitted(sequence, tmp_path_factory):
 
 def summary_of(folder):
     return json.loads((folder / "summary.json").read_text())
+
+
+def test_a_solver_that_is_not_installed_leaves_an_earlier_result_alone(
+    sequence, tmp_path, monkeypatch
+):
+    (tmp_path / "track.npz").write_bytes(b"earlier")
+    monkeypatch.setitem(sys.modules, "casadi", None)
+    config = TrackerConfig(solver=SolverConfig(method="ipopt"))
+    with pytest.raises(ConfigError, match="CasADi"):
+        fit_sequence(sequence, tmp_path, config)
+    assert (tmp_path / "track.npz").read_bytes() == b"earlier"
 
 
 def test_a_recording_becomes_a_valid_result_folder(fitted, human):

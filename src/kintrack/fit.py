@@ -91,6 +91,7 @@ def fit_sequence(
 
     Raises:
         ResultError: if an output cannot be written, before any work.
+        ConfigError: if the solver is not installed, before anything written earlier is touched.
         CalibrationError: if a person or height is given that `body` has no use for, or nobody is as
             tall as stated.
     """

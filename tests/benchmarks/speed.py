@@ -206,8 +206,8 @@ def _section(measured: Measured, metrics: Sequence[Metric], facts: dict[str, str
             "One process, default configuration; reading files is left out, and the time of a "
             "start stands apart. Standing and fast: UTD-MHAD at 320 x 240; the others: 640 x 480. "
             "Labelled: the network that ships labels every frame (in `observe`), from a cold "
-            "start; the others are the geometric tracker. Rivals are part of the frames in which "
-            "they are followed (`rival`).",
+            "start; the others are the geometric tracker. Rivals run beside a frame's stages and "
+            "slow them; `rival` is the wait for them at its end.",
             target_table(metrics),
             "### Stages",
             "A stage's time in a frame is the sum over the frame's rounds.",

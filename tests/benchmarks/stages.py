@@ -20,7 +20,7 @@ from kintrack.tracker import Tracker
 
 STAGES = ("observe", "skin", "associate", "solve", "report", "rival")
 """Stages of a frame that is tracked, in order; "observe" contains prediction and labels, "rival"
-all that rivals take."""
+the wait for rivals, who run beside the other stages and slow them."""
 
 
 @dataclass

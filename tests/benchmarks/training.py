@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Train the weights that ship, or every network that the tables compare, with one command.
+"""Train weights to ship, or every network that the tables compare, with one command.
 
 Data are made, networks trained one after the other in out/training/; a stopped run goes on.
 
@@ -34,13 +34,13 @@ FOLDER = OUT / "training"
 PAPER_FRAMES, PAPER_PARTS = 120, ("paper/train", "paper/objects")
 FULL_FRAMES, QUICK_FRAMES = 6_000, 60
 STEPS = {"ship": 6_500, "compare": 20_000}
-"""Usual length of each training; `ship` takes 1.6 h on two cores."""
+"""Usual length of each training; `ship` takes 1.7 h on two cores."""
 PREPARED = {"ship": 64_000, "compare": 0}
 """Samples that are usually made once and learnt from again."""
 BANK = ("--bank.cutouts", "3000", "--bank.rooms", "600")
 """Things and rooms to put into pictures, as many as for what ships."""
 WIDTHS = {
-    "fast_fcn": "48 96 256 512",
+    "fast_fcn": "32 64 192 512",
     "unet": "64 128 256 512 1024",
     "vgg_fcn": "64 128 256 512 512",
 }
@@ -62,12 +62,15 @@ class Recipe(NamedTuple):
     """Which network."""
     options: tuple[str, ...] = ()
     """What is unlike the others."""
+    widths: str = ""
+    """Channels per level; those of `WIDTHS` if empty."""
 
 
 SHIPPED = Recipe(
     "ship",
     "fast_fcn",
     ("--background-weight", "0.25", "--augment.region", "0.6", "--augment.other-room", "0.2"),
+    "48 96 256 512",
 )
 COMPARED = (
     Recipe("fast_fcn", "fast_fcn"),
@@ -150,7 +153,8 @@ def _train(
 ) -> Path:
     """Weights of a run, which goes on where it was stopped."""
     path = folder / recipe.name / WEIGHTS_FILE
-    widths = (QUICK_WIDTHS if arguments.quick else WIDTHS)[recipe.architecture]
+    usual = (QUICK_WIDTHS if arguments.quick else WIDTHS)[recipe.architecture]
+    widths = usual if arguments.quick else recipe.widths or usual
     sets = arguments.sets or ("training", *(() if arguments.quick else PAPER_PARTS))
     if not path.is_file():
         bank = ("--bank.cutouts", "4", "--bank.rooms", "2") if arguments.quick else BANK

@@ -37,7 +37,7 @@ TITLES = {
 }
 _NAMES = {GEOMETRY: "geometry alone", TRUE_LABELS: "true labels", RGB: "RGB regression"}
 _COLORS = {GEOMETRY: "#d55e00", TRUE_LABELS: "#000000", RGB: "#cc79a7"}
-_NETWORKS = ("#0072b2", "#009e73", "#e69f00", "#56b4e9", "#999999")
+_NETWORKS = ("#0072b2", "#009e73", "#e69f00", "#56b4e9", "#999999", "#8c564b", "#b0a800", "#6a3d9a")
 _STYLES = {CALIBRATED: "-.", HARD: ":"}
 _CONDITIONS = {CLEAN: "#999999", SCENE: "#000000", **dict(
     zip(OBJECTS, ("#d55e00", "#e69f00", "#56b4e9"), strict=True))}  # fmt: skip
