@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kintrack.body import Body, run_kinematics
+from kintrack.clothing import dressed_human
 from kintrack.config import TrackerConfig
 from kintrack.geometry import (
     T_LEVEL_WORLD_CAMERA,
@@ -84,8 +85,8 @@ def body(human) -> Body:
 
 
 @pytest.fixture(scope="session")
-def scene(human) -> Scene:
-    return Scene(human, PinholeCamera(320, 240, 286.0, 286.0, 159.5, 119.5))
+def scene() -> Scene:
+    return Scene(dressed_human(), PinholeCamera(320, 240, 286.0, 286.0, 159.5, 119.5))
 
 
 @pytest.fixture(scope="session")
@@ -98,7 +99,7 @@ def unsized() -> TrackerConfig:
 @pytest.fixture(scope="session")
 def quick(unsized) -> TrackerConfig:
     """As `unsized`, and the person stands as expected, so that a start needs few rounds."""
-    return replace(unsized, start=replace(unsized.start, rounds=6))
+    return replace(unsized, start=replace(unsized.start, rounds=8))
 
 
 @pytest.fixture(scope="session")

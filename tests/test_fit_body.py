@@ -9,9 +9,9 @@ import pytest
 
 from kintrack.calibration.config import BodyConfig, BundleConfig, CalibrationConfig, MeetingConfig
 from kintrack.calibration.measures import height
+from kintrack.clothing import dressed_human
 from kintrack.commands.fit import said_of_body
 from kintrack.fit import fit_sequence, load_person
-from kintrack.human import load_human
 from kintrack.result import Track
 from kintrack.sequence import open_sequence
 from kintrack.sequence.write import SequenceWriter
@@ -37,7 +37,7 @@ def filmed(scene, folder, human, moves=1.0, frames=FRAMES):
 
 @pytest.fixture(scope="module")
 def tall(scene, tmp_path_factory):
-    return filmed(scene, tmp_path_factory.mktemp("tall") / "tall", load_human(shape=TALL))
+    return filmed(scene, tmp_path_factory.mktemp("tall") / "tall", dressed_human(TALL))
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +119,7 @@ def test_who_stands_still_gets_a_body_too(scene, tmp_path):
 
 
 def test_a_child_is_tracked_with_the_template_and_the_reason(scene, tmp_path):
-    child = load_human(shape=np.array([-4.2, 0.0]))
+    child = dressed_human(np.array([-4.2, 0.0]))
     filmed_child = filmed(scene, tmp_path / "child", child, frames=9)
     fit_sequence(filmed_child, tmp_path / "result", body=QUICK)
     summary = summary_of(tmp_path / "result")

@@ -6,9 +6,10 @@ import pytest
 
 from kintrack.association.observation import observe
 from kintrack.body import run_kinematics
+from kintrack.clothing import dressed_human
 from kintrack.config import TrackerConfig
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, camera_pose, invert_rigid, transform_points
-from kintrack.human import SITTING_DEG, load_human
+from kintrack.human import SITTING_DEG
 from kintrack.judge import acceptable
 from kintrack.skin import skinned_vertices
 from kintrack.start import find_person, sized, start
@@ -44,22 +45,22 @@ def nearest(*depths):
     ids=["upright", "turned right", "turned left", "sitting"],
 )
 def test_a_person_is_found_from_several_headings_and_postures(
-    human, scene, unsized, degrees, heading_deg, at
+    scene, unsized, degrees, heading_deg, at
 ):
     q = scene.place(degrees, heading_deg, at)
-    found = start(human, seen(scene, scene.depth(q)), T_LEVEL_WORLD_CAMERA, unsized)
+    found = start(scene.human, seen(scene, scene.depth(q)), T_LEVEL_WORLD_CAMERA, unsized)
     assert found is not None
     assert acceptable(found.agreed, found.fit.surface.rms_m, unsized.judge)
     errors = scene.errors(q, scene.joints(found.fit.state.q))
     assert errors.mean() < 0.03
-    true_chest = run_kinematics(human.body, q).Ts_world_link[2, :3, 0]
+    true_chest = run_kinematics(scene.human.body, q).Ts_world_link[2, :3, 0]
     assert found.fit.state.Ts_world_link[2, :3, 0] @ true_chest > np.cos(np.radians(25))
 
 
-def test_a_camera_that_looks_down_finds_the_same_person(human, scene, quick):
+def test_a_camera_that_looks_down_finds_the_same_person(scene, unsized):
     q = scene.place(STANDING_TALL)
     T_world_camera = camera_pose(15.0)
-    found = start(human, seen(scene, scene.depth(q)), T_world_camera, quick)
+    found = start(scene.human, seen(scene, scene.depth(q)), T_world_camera, unsized)
     positions = transform_points(
         invert_rigid(T_world_camera), found.fit.state.joint_positions_world
     )
@@ -83,18 +84,18 @@ def test_of_two_people_the_nearer_is_taken(scene, unsized):
 
 
 @pytest.mark.parametrize("wall_m", [0.8, 2.5, 4.0, 5.5])
-def test_a_wall_is_nobody(human, scene, unsized, wall_m):
+def test_a_wall_is_nobody(scene, unsized, wall_m):
     observation = seen(scene, plane(scene, wall_m))
-    assert start(human, observation, T_LEVEL_WORLD_CAMERA, unsized) is None
+    assert start(scene.human, observation, T_LEVEL_WORLD_CAMERA, unsized) is None
 
 
-def test_small_and_far_things_are_nobody(human, scene, unsized):
+def test_small_and_far_things_are_nobody(scene, unsized):
     for depth in (
         plane(scene, 2.0, width_m=0.4, height_m=0.4),
         plane(scene, 2.0, width_m=0.1, height_m=1.5),
         plane(scene, 8.0, width_m=0.6, height_m=1.7),
     ):
-        assert start(human, seen(scene, depth), T_LEVEL_WORLD_CAMERA, unsized) is None
+        assert start(scene.human, seen(scene, depth), T_LEVEL_WORLD_CAMERA, unsized) is None
 
 
 @pytest.mark.parametrize(
@@ -106,11 +107,11 @@ def test_a_flat_thing_of_human_height_is_not_tracked(scene, quick, width_m, heig
 
 
 @pytest.mark.parametrize("value", [0.0, np.nan])
-def test_an_empty_image_holds_nobody(human, scene, unsized, value):
+def test_an_empty_image_holds_nobody(scene, unsized, value):
     shape = (scene.camera.height, scene.camera.width)
     observation = seen(scene, np.full(shape, value))
     assert find_person(observation, T_LEVEL_WORLD_CAMERA, unsized.start) is None
-    assert start(human, observation, T_LEVEL_WORLD_CAMERA, unsized) is None
+    assert start(scene.human, observation, T_LEVEL_WORLD_CAMERA, unsized) is None
 
 
 def test_nobody_smaller_than_wanted_is_found(scene, unsized):
@@ -120,16 +121,16 @@ def test_nobody_smaller_than_wanted_is_found(scene, unsized):
     assert find_person(observation, T_LEVEL_WORLD_CAMERA, giants) is None
 
 
-def test_a_tall_person_is_measured_within_four_centimetres(human, scene):
+def test_a_tall_person_is_measured_within_four_centimetres(scene):
 
     config = TrackerConfig()
-    person = load_human(shape=np.array([1.5, 0.0]))
+    person = dressed_human(np.array([1.5, 0.0]))
     q = scene.place(STANDING_TALL, at=(3.0, 0.0, 0.0))
     observation = seen(scene, scene.depth(q, person))
-    begun = start(human, observation, T_LEVEL_WORLD_CAMERA, config)
-    measured, refitted = sized(human, begun, T_LEVEL_WORLD_CAMERA, config)
+    begun = start(scene.human, observation, T_LEVEL_WORLD_CAMERA, config)
+    measured, refitted = sized(scene.human, begun, T_LEVEL_WORLD_CAMERA, config)
     assert stature(measured) == pytest.approx(stature(person), abs=0.04)
-    assert stature(person) - stature(human) > 0.1
+    assert stature(person) - stature(scene.human) > 0.1
     assert len(measured.shape) == config.start.shape_coefficients
     assert np.abs(measured.shape).max() <= config.start.shape_limit + 1e-9
     errors = np.linalg.norm(

@@ -140,11 +140,11 @@ def without_left_arm(scene, human, q):
     return np.where(hidden, 1.0, np.where(face >= 0, depth, 0.0)).astype(np.float32)
 
 
-def test_a_limb_without_data_stays_predicted_and_its_doubt_grows(scene, human, after):
+def test_a_limb_without_data_stays_predicted_and_its_doubt_grows(scene, after):
     tracker = after(14)  # arms up
     q = waving(scene, 15)
     seen = track(tracker, [scene.frame(scene.depth(q), i) for i in (15, 16, 17)])
-    masked = without_left_arm(scene, human, q)
+    masked = without_left_arm(scene, scene.human, q)
     blind = track(tracker, [scene.frame(masked, i) for i in range(18, 28)])
     assert {result.status for result in seen + blind} == {"tracking"}
     hand, other = JOINT_NAMES.index("l_hand"), JOINT_NAMES.index("r_hand")

@@ -17,14 +17,15 @@ from numpy import ndarray
 from kintrack.body import run_kinematics
 from kintrack.calibration.acquaintance import Acquaintance, Again
 from kintrack.calibration.config import BodyConfig
-from kintrack.calibration.person import Person, dressed_human, human_of
+from kintrack.calibration.person import Person, human_of
+from kintrack.clothing import dressed_human
 from kintrack.config import TrackerConfig
 from kintrack.errors import ResultError
 from kintrack.export import HtmlRecorder, VideoWriter, draw_overlay
 from kintrack.export.overlay import depth_range
 from kintrack.files import make_result_folder
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
-from kintrack.human import Human, load_human
+from kintrack.human import Human
 from kintrack.joints import JOINT_NAMES
 from kintrack.labelled_config import LabelledConfig
 from kintrack.result import FrameResult, Track
@@ -156,8 +157,7 @@ def _pass(
         shades = None
         for frame, result, human, labels in _settled(sequence, tracker):
             writer.append(result)
-            worn = acquaintance.clothing_m
-            writer.note(person={"shape": human.shape, "clothing_m": worn})
+            writer.note(person={"shape": human.shape, "clothing_m": dict(human.clothing_m)})
             vertices = posed_skin(human, result.q, T_world_camera)
             joints = result.joint_positions_camera_m
             text = caption(result)
@@ -256,9 +256,7 @@ def load_person(folder: Path) -> tuple[Human, Float[ndarray, "4 4"]]:
         T_world_camera = np.array(summary["T_world_camera"], dtype=float).reshape(4, 4)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise ResultError(f"{path}: no readable summary of a result ({error!r})") from error
-    if worn:
-        return dressed_human(shape, worn), T_world_camera
-    return load_human(shape=shape if len(shape) else None), T_world_camera
+    return dressed_human(shape if len(shape) else None, worn), T_world_camera
 
 
 def _rate(sequence: SequenceReader) -> float:

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -53,6 +54,8 @@ class Human:
     """Shape coefficients [standard deviations]; empty for the average adult."""
     folder: Path | None = None
     """Model folder; None for the one that ships."""
+    clothing_m: Mapping[str, float] = field(default_factory=dict)
+    """Thickness of what the skin wears per region [m], see `kintrack.clothing`; empty for none."""
 
 
 def load_human(folder: Path | None = None, shape: Float[ndarray, " k"] | None = None) -> Human:

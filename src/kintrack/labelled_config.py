@@ -146,8 +146,10 @@ class LabelledStartConfig:
     """Associations of each fit."""
     last_rounds: int = 6
     """Further associations of the best fit."""
-    tilt_rad: float = 0.5
-    """How far the pelvis may lean from where a guess has it [rad]."""
+    pitch_rad: float = 0.5
+    """How far the pelvis may lean forward from where a guess has it [rad]."""
+    roll_rad: float = 0.2
+    """How far it may lean aside [rad]."""
     side_m: float = 0.06
     """How far a label's left or right is believed against the geometry [m]."""
 
@@ -159,7 +161,8 @@ class LabelledStartConfig:
             gate_m=(0.02, 2),
             rounds=(1, 100),
             last_rounds=(1, 100),
-            tilt_rad=(0.01, 10),
+            pitch_rad=(0.01, 10),
+            roll_rad=(0.01, 10),
             side_m=(0, 10),
         )
 

@@ -15,11 +15,12 @@ from kintrack.alignment import View, view_skin
 from kintrack.association.observation import Observation
 from kintrack.belief import Belief
 from kintrack.body import BodyState
+from kintrack.clothing import dressed_human
 from kintrack.config import TrackerConfig
 from kintrack.deformation.surface import Surface, met
 from kintrack.floor import Ground, soles_of
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid
-from kintrack.human import RESTING_DEG, Human, load_human, posed, prior_sigma
+from kintrack.human import RESTING_DEG, Human, posed, prior_sigma
 from kintrack.lifecycle import Life, LifecycleConfig, Reading
 from kintrack.person import LabelledConfig, geometric_lifecycle
 from kintrack.reporting import empty_result
@@ -50,7 +51,7 @@ class Memory:
 
         Args:
             config: All weights; the defaults if None.
-            human: Body and skin; the average adult if None.
+            human: Body and skin; the average adult, dressed as people are, if None.
             T_world_camera: Camera pose; a level camera if not given.
             clock: Called after each stage with its name, for benchmarks.
             segmenter: Labels every frame; None for the geometry alone.
@@ -78,7 +79,7 @@ class Memory:
         self.surface: Surface | None = None
         self._clock = clock
         self._threads = ThreadpoolController()
-        self._meet(load_human() if human is None else human)
+        self._meet(dressed_human() if human is None else human)
 
     def _meet(self, human: Human) -> None:
         """Take this person's body and what belongs to it."""

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from kintrack.association.observation import Observation, observe
 from kintrack.body import run_kinematics
-from kintrack.calibration.clothing import REGIONS, dressed_space
+from kintrack.clothing import REGIONS, dressed_space
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, PinholeCamera, invert_rigid, transform_points
 from kintrack.human import RESTING_DEG, load_human, posed
 from kintrack.raster import rasterise

@@ -60,14 +60,14 @@ def met(rms_m=0.010):
     who = acquainted()
     with pytest.raises(Again):
         for frame in frames(5, rms_m):
-            assert who.person is None and who.clothing_m == {}
+            assert who.person is None
             who.see(*frame)
     return who
 
 
 def test_once_she_is_known_the_recording_is_tracked_again_with_her(known_at_the_fifth):
     who = met()
-    assert who.person is PERSON and who.clothing_m == {"chest": 0.02}
+    assert who.person is PERSON
     for frame in frames(9):
         who.see(*frame)
     who.conclude()
@@ -125,7 +125,7 @@ def test_who_is_given_is_not_met_either(monkeypatch):
     monkeypatch.setattr(acquaintance, "Meeting", None)
     assert acquainted(given=PERSON).told()["used"] == "given"
     doubtful = acquainted(given=NOBODY)
-    assert doubtful.person is None and doubtful.clothing_m == {}
+    assert doubtful.person is None
     assert doubtful.told()["used"] == "the template in place of the person given"
     assert doubtful.told()["height_m"]["value_m"] == 1.7
 

@@ -10,14 +10,14 @@ from kintrack.body import run_kinematics
 from kintrack.calibration import bundle
 from kintrack.calibration.blocks import Blocks, Snapshot, blocks_of, surface_of
 from kintrack.calibration.bundle import Gaussian, Measurement, solve_bundle
-from kintrack.calibration.clothing import (
+from kintrack.calibration.config import BundleConfig
+from kintrack.clothing import (
     REGIONS,
     THICKEST_M,
     coverage,
     dressed_space,
     fold_sigma,
 )
-from kintrack.calibration.config import BundleConfig
 from kintrack.config import TrackerConfig
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA
 from kintrack.human import RESTING_DEG, Human, load_human, posed, prior_sigma

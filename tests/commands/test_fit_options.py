@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import kintrack
-from kintrack.calibration.clothing import REGIONS
 from kintrack.calibration.measures import LIMBS, Length
 from kintrack.calibration.person import Person, write_person
 from kintrack.cli import main
+from kintrack.clothing import REGIONS
 from kintrack.fit import load_person
 from kintrack.result import Track
 

@@ -111,7 +111,7 @@ def test_pixels_of_another_part_teach_nothing(scene, human, fold, pose, state):
 
 
 def test_something_in_front_of_the_body_is_not_taken_for_clothes(scene, human, pose, state):
-    depth = scene.depth(pose)
+    depth = scene.depth(pose, human)
     depth[depth > 0] -= 0.10
     taught = learnt(human, [observe(scene.frame(depth), 320)] * 10, state)
     assert not taught.offsets_m.any()

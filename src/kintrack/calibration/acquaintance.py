@@ -72,11 +72,6 @@ class Acquaintance:
         self._course = _Course()
         self._dropped: str | None = None
 
-    @property
-    def clothing_m(self) -> dict[str, float]:
-        """What the tracked body wears [m]; nothing for the template."""
-        return {} if self.person is None else self.person.clothing_m
-
     def see(
         self,
         frame: Frame,

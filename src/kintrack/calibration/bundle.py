@@ -2,7 +2,7 @@
 """One shape for several frames, jointly with the pose in each.
 
 With d_i = s_i(q_f, b) - p_i for the pairs of frame f, the cost is the surface term of
-`kintrack.residuals.surface` over all frames, its scale the folds' (`calibration.clothing`), plus
+`kintrack.residuals.surface` over all frames, its scale the folds' (`kintrack.clothing`), plus
 pose priors, plus 0.5 |(b - mean) / sigma|^2 over shape and clothes. Its Gauss-Newton matrix is an
 arrow: one block per pose, bordered by the shape. The poses are eliminated (Schur complement), the
 shape is solved within its bounds, and each pose follows within its hinge limits [Triggs et al.,
@@ -10,8 +10,9 @@ Bundle adjustment, 1999, section 6.1].
 
 The pairs say less than their number suggests, by a factor c = inflation (rms / usual_rms)^4: with
 H_seen the matrix of all frames, poses eliminated, and H_known that of prior and measurements, the
-covariance is (H_seen / c + H_known)^-1. In the fit itself a measurement weighs c-fold against the
-pairs for the same reason; the prior does not, for it would hold unusual people back.
+covariance is (H_seen / c + H_known)^-1. In the fit a measurement weighs c-fold against the pairs
+for the same reason, and the prior sqrt(c)-fold: where little is seen the estimate stays near what
+most people are. With 1 it strays, with c it holds unusual people back (`docs/shape.md`).
 """
 
 from __future__ import annotations
@@ -140,13 +141,13 @@ def solve_bundle(
 
 
 def _known(
-    b: ndarray, prior: Gaussian, measurements: Sequence[Measurement], measured: float = 1.0
+    b: ndarray, prior: Gaussian, measurements: Sequence[Measurement], doubt: float = 1.0
 ) -> tuple[ndarray, ndarray]:
-    """Matrix and gradient of prior and measurements, the latter `measured` times as heavy."""
-    H = np.diag(prior.sigma**-2.0)
-    g = (b - prior.mean) / prior.sigma**2
+    """Matrix and gradient of prior and measurements, heavier the more the pairs are doubted."""
+    H = np.diag(np.sqrt(doubt) * prior.sigma**-2.0)
+    g = np.sqrt(doubt) * (b - prior.mean) / prior.sigma**2
     for m in measurements:
-        weight = measured / m.sigma**2
+        weight = doubt / m.sigma**2
         H = H + weight * np.outer(m.gradient, m.gradient)
         g = g + weight * m.gradient * (m.gradient @ b - m.value)
     return H, g

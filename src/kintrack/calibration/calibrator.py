@@ -18,13 +18,13 @@ from kintrack.association.observation import Observation
 from kintrack.body import run_kinematics
 from kintrack.calibration.blocks import Snapshot
 from kintrack.calibration.bundle import Bundle, Gaussian, Measurement, solve_bundle
-from kintrack.calibration.clothing import REGIONS, THICKEST_M, dressed_space, fold_sigma
 from kintrack.calibration.config import CalibrationConfig
 from kintrack.calibration.errors import CalibrationError
 from kintrack.calibration.measures import Length, height, measured
 from kintrack.calibration.person import Person
 from kintrack.calibration.selection import spread, varied
 from kintrack.calibration.verdict import LIMITS, Limits, problems_of
+from kintrack.clothing import REGIONS, THICKEST_M, dressed_space, fold_sigma
 from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points

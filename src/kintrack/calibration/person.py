@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.calibration.clothing import REGIONS, THICKEST_M, dressed_space
 from kintrack.calibration.errors import CalibrationError
 from kintrack.calibration.measures import LIMBS, Length
+from kintrack.clothing import REGIONS, THICKEST_M, USUAL_M, dressed_human
 from kintrack.files import write_json
 from kintrack.human import Human
 from kintrack.shape import load_shape_space
@@ -81,29 +80,8 @@ def human_of(person: Person, folder: Path | None = None, dressed: bool = True) -
     Raises:
         ModelError: if a model file is broken or does not have that many coefficients.
     """
-    worn = person.clothing_m if dressed and not person.is_template else {}
-    return dressed_human(person.shape, worn, folder)
-
-
-def dressed_human(
-    shape: Float[ndarray, " k"], clothing_m: Mapping[str, float], folder: Path | None = None
-) -> Human:
-    """A body of some shape, its skin where the clothes are.
-
-    Args:
-        shape: Shape coefficients [standard deviations of adults].
-        clothing_m: Thickness of what is worn per region [m]; empty for none.
-        folder: Model folder; the one that ships if None.
-
-    Raises:
-        ModelError: if a model file is broken or does not have that many coefficients.
-    """
-    space = load_shape_space(folder)
-    skin = space.bound(shape)
-    if clothing_m:
-        worn = np.array([clothing_m[region.name] for region in REGIONS])
-        skin = dressed_space(space).bound(np.concatenate([shape, worn]))
-    return Human(space.body(shape), skin, shape, folder)
+    known = USUAL_M if person.is_template else person.clothing_m
+    return dressed_human(person.shape, known if dressed else {}, folder)
 
 
 def write_person(person: Person, path: Path) -> None:

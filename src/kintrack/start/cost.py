@@ -231,7 +231,7 @@ def _part_cost(
             if label != k + 1 and seen > z - 0.08:
                 same_kind = k >= 2 and label >= 3 and (label - 1) // 2 == k // 2
                 out = max(out, min(OTHER_PART_M, np.sqrt(side2)) if same_kind else OTHER_PART_M)
-        elif seen > z - NEAR_M or (seen == 0.0 and not has_background):
+        elif seen > z + NEAR_M or (seen == 0.0 and not has_background):
             out = away[r, u] * z / intrinsics[0]
         out = min(out, CAP_M)
         cost += each * out * out

@@ -79,10 +79,10 @@ def start_at(
     def settled(view: View) -> Observation:
         return settle(seen, view, config.association.doubt_m, start.side_m)
 
-    def fitted(q: ndarray, gates: list[float]) -> tuple[float, Fit, View] | None:
+    def fitted(q: ndarray, gates: list[float], likely_q: ndarray) -> tuple[float, Fit, View] | None:
         sigma = prior_sigma(human.body, config.prior)
-        sigma[3:5] = start.tilt_rad
-        prior = diagonal_prior(q, sigma)
+        sigma[3:5] = start.roll_rad, start.pitch_rad
+        prior = diagonal_prior(likely_q, sigma)
         view = view_skin(human, run_kinematics(human.body, q), T_camera_world, seen, config)
         try:
             fit = fit_pose(human, settled(view), q, [prior], T_world_camera, config, gates)
@@ -93,14 +93,14 @@ def start_at(
 
     best, least = None, np.inf
     for guess in tries:
-        found = fitted(guess.q, gates)
+        found = fitted(guess.q, gates, guess.q)
         if found is not None and found[0] + guess.unrest_m2 < least:
-            best, least = found, found[0] + guess.unrest_m2
+            best, likely_q, least = found, guess.q, found[0] + guess.unrest_m2
     if best is None:
         return None
-    best = fitted(best[1].state.q, [last] * start.last_rounds)
-    if best is None:
-        return None
+    closer = fitted(best[1].state.q, [last] * start.last_rounds, likely_q)
+    if closer is not None and closer[0] < best[0]:
+        best = closer
     cost, fit, view = best
     agreed = agreement(view, settled(view), config.judge.explained_m)
     return Start(fit, agreed, seen, cost)

@@ -8,10 +8,11 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from kintrack.alignment import Fit, fit_pose, view_skin
+from kintrack.clothing import dressed_human
 from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
 from kintrack.geometry import invert_rigid
-from kintrack.human import Human, load_human, prior_sigma
+from kintrack.human import Human, prior_sigma
 from kintrack.judge import agreement, distance_between
 from kintrack.residuals.prior import diagonal_prior
 from kintrack.start.begun import Start
@@ -45,7 +46,7 @@ def sized(
     seen = begun.observation
 
     def refit(shape: ndarray) -> tuple[float, Human, Fit]:
-        person = load_human(human.folder, shape)
+        person = dressed_human(shape, human.clothing_m, human.folder)
         prior = diagonal_prior(begun.fit.state.q, prior_sigma(person.body, config.prior))
         fit = fit_pose(person, seen, begun.fit.state.q, [prior], T_world_camera, config, gates)
         view = view_skin(person, fit.state, T_camera_world, seen, config)

@@ -8,14 +8,18 @@ sides and in every pose, plus folds. Means and spreads are those of 60 dressed t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.shape import ShapeSpace
+from kintrack.human import Human, load_human
+from kintrack.shape import ShapeSpace, checked_shape, load_shape_space
 from kintrack.skin import vertex_normals
 
 
@@ -47,6 +51,8 @@ REGIONS = (
     Region("foot", ("foot",), 0.009, 0.005, 0.009),
 )
 """Everything that is covered; face and hands are bare."""
+USUAL_M: Mapping[str, float] = MappingProxyType({r.name: r.mean_m for r in REGIONS})
+"""What people wear on average, per region [m]."""
 FACE_M = 0.008
 """Spread of faces about the body's [m]."""
 HAND_M = 0.020
@@ -83,6 +89,36 @@ def dressed_space(space: ShapeSpace) -> ShapeSpace:
     """The shape space with the thickness of every region as a further coefficient [m]."""
     normals = vertex_normals(space.vertices_m, space.skin.faces)
     return space.widened(coverage(space).T[:, :, None] * normals)
+
+
+def dressed_human(
+    shape: Float[ndarray, " k"] | None = None,
+    clothing_m: Mapping[str, float] = USUAL_M,
+    folder: Path | None = None,
+) -> Human:
+    """A body of some shape, its skin where the clothes are.
+
+    Args:
+        shape: Shape coefficients [standard deviations of adults]; the average adult if None.
+        clothing_m: Thickness of what is worn per region [m]; empty for none.
+        folder: Model folder; the one that ships if None.
+
+    Raises:
+        ModelError: if a model file is broken or does not have that many coefficients.
+    """
+    if not clothing_m:
+        return load_human(folder, shape)
+    space = load_shape_space(folder)
+    b, worn = checked_shape(space, shape), [clothing_m[region.name] for region in REGIONS]
+    skin = _wardrobe(folder).bound(np.concatenate([b, worn]))
+    told = np.zeros(0) if shape is None else np.array(shape)
+    return Human(space.body(b), skin, told, folder, dict(clothing_m))
+
+
+@cache
+def _wardrobe(folder: Path | None) -> ShapeSpace:
+    """`dressed_space` of a folder."""
+    return dressed_space(load_shape_space(folder))
 
 
 def fold_sigma(space: ShapeSpace) -> Callable[[Float[ndarray, " p"]], Float[ndarray, " v"]]:
