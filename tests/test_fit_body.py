@@ -9,7 +9,7 @@ import pytest
 
 from kintrack.calibration.config import BodyConfig, BundleConfig, CalibrationConfig, MeetingConfig
 from kintrack.calibration.measures import height
-from kintrack.clothing import dressed_human
+from kintrack.clothing import USUAL_M, dressed_human
 from kintrack.commands.fit import said_of_body
 from kintrack.fit import fit_sequence, load_person
 from kintrack.result import Track
@@ -108,6 +108,8 @@ def test_the_template_stays_where_it_is_wanted(tall, tmp_path):
     summary = summary_of(tmp_path)
     assert summary["body"] == {"kind": "template", "used": "template", "attempts": []}
     assert len(summary["person"]["shape"]) == 3 and said_of_body(summary["body"]) == []
+    assert summary["person"]["clothing_m"] == dict(USUAL_M)
+    assert dict(load_person(tmp_path)[0].clothing_m) == dict(USUAL_M)
 
 
 def test_who_stands_still_gets_a_body_too(scene, tmp_path):

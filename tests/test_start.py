@@ -132,6 +132,7 @@ def test_a_tall_person_is_measured_within_four_centimetres(scene):
     assert stature(measured) == pytest.approx(stature(person), abs=0.04)
     assert stature(person) - stature(scene.human) > 0.1
     assert len(measured.shape) == config.start.shape_coefficients
+    assert measured.clothing_m == scene.human.clothing_m != {}
     assert np.abs(measured.shape).max() <= config.start.shape_limit + 1e-9
     errors = np.linalg.norm(
         scene.joints(refitted.fit.state.q, measured) - scene.joints(q, person), axis=1

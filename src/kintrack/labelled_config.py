@@ -62,7 +62,7 @@ class PeopleConfig:
     """Depth step between neighbouring pixels that parts two pieces [m]."""
     link_m: float = 0.2
     """Pieces this near to each other are one person [m]."""
-    aside_m: float = 0.2
+    aside_m: float = 0.35
     """Pieces above each other may be one person if no further aside than this [m]."""
     above_m: float = 0.9
     """And if the gap between them is no higher than this [m]."""

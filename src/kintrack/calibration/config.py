@@ -11,8 +11,8 @@ from kintrack.calibration.errors import CalibrationError
 from kintrack.config import TrackerConfig
 
 BodyKind = Literal["template", "calibrated", "deformable"]
-"""template: the average adult, stature and build sized in the first frame; calibrated: the person's
-own body and clothes; deformable: the same, and the skin follows cloth and folds."""
+"""template: the average adult in average clothes, stature and build sized at the start; calibrated:
+the person's own body and clothes; deformable: the same, and the skin follows cloth and folds."""
 
 
 @dataclass(frozen=True)

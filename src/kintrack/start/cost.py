@@ -22,8 +22,9 @@ FACING = 0.1
 """Least cosine between a normal and the ray for skin that can be seen."""
 AT_REST_M2 = 4e-4
 """What a limb that is not at rest costs more, in squared metres of mean distance [m^2]."""
-UNSEEN_M2, UNSEEN_M4 = 0.02, 1.5e-4
-"""A limb that shows less than this [m^2] costs up to this more [m^4] if it is not at rest."""
+UNSEEN_M2, UNSEEN_M4 = 0.02, 3e-4
+"""A limb that shows less than this [m^2] costs up to this more [m^4] if it is neither at rest nor, a
+leg, as the other one."""
 OTHER_PART_M = 0.06
 """What skin costs that lies on pixels of another part [m]."""
 NEAR_M = 0.05
@@ -50,7 +51,9 @@ def place(
     first = np.isnan(t[0])
     if first:
         t[:] = _roughly(points, weights, ends, skins, eye, trunk)
+    rest = np.zeros(6, dtype=np.int64)
     for _ in range(turns):
+        _rest_of_legs(weights, ends, owner, chosen, rest)
         for n in range(3):
             only = 2 if trunk and first and n < 2 else 6
             t[:] = _shifted(points, weights, ends, owner, skins, normals, chosen, t, eye, only)
@@ -65,7 +68,7 @@ def place(
                     cost = _part_cost(
                         points, weights, owner, low, high, v[p], n[p], t, eye, R, shift,
                         intrinsics, depth, away, labels, has_background, k, each[k], side2, best,
-                    ) + _unrest(weights, owner, low, high, k, p)  # fmt: skip
+                    ) + _unrest(weights, owner, low, high, k, p, rest[k])  # fmt: skip
                     if cost < best:
                         best = cost
                         chosen[k] = p
@@ -80,7 +83,7 @@ def place(
     unrest = 0.0
     for k in range(2, 6):
         low, high = _range(ends, k)
-        unrest += _unrest(weights, owner, low, high, k, chosen[k]) / weights.sum()
+        unrest += _unrest(weights, owner, low, high, k, chosen[k], rest[k]) / weights.sum()
     return cost, unrest
 
 
@@ -117,15 +120,33 @@ def _range(ends, k):
 
 
 @njit(cache=True, nogil=True)
-def _unrest(weights, owner, low, high, k, posture):
-    """What it costs a limb not to be at rest."""
-    if posture == 0:
-        return 0.0
+def _rest_of_legs(weights, ends, owner, chosen, rest):
+    """The posture that costs an unseen leg nothing: that of the other leg, which shows more."""
+    low, high = _range(ends, 4)
+    right, left = _area(weights, owner, low, high, 4), _area(weights, owner, low, high, 5)
+    rest[4], rest[5] = 0, 0
+    if right < left:
+        rest[4] = chosen[5]
+    elif left < right:
+        rest[5] = chosen[4]
+
+
+@njit(cache=True, nogil=True)
+def _area(weights, owner, low, high, k):
+    """How much is seen of part k [m^2]."""
     area = 0.0
     for i in range(low, high):
         if owner[i] == k:
             area += weights[i]
-    return AT_REST_M2 * area + UNSEEN_M4 * max(1.0 - area / UNSEEN_M2, 0.0)
+    return area
+
+
+@njit(cache=True, nogil=True)
+def _unrest(weights, owner, low, high, k, posture, rest):
+    """What it costs a limb not to be at rest, or, where it is unseen, not as the other leg."""
+    area = _area(weights, owner, low, high, k)
+    cost = 0.0 if posture == 0 else AT_REST_M2 * area
+    return cost if posture == rest else cost + UNSEEN_M4 * max(1.0 - area / UNSEEN_M2, 0.0)
 
 
 @njit(cache=True, nogil=True)

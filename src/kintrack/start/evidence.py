@@ -29,7 +29,8 @@ class Evidence(NamedTuple):
     ends: Int[ndarray, " 7"]
     """Part y has the points ends[y-1] to ends[y]."""
     depth_m: Float[ndarray, "h w"]
-    """Depth at working resolution [m]; 0 = no reading."""
+    """Depth at working resolution [m]; 0 = no reading. Beside the person the least of a pixel and
+    its neighbours, so that skin on the rim of an overlooked limb does not stand in free space."""
     away_px: Float[ndarray, "h w"]
     """Distance of each pixel from the person's [px]."""
     labels: UInt8[ndarray, "h w"]
@@ -75,12 +76,13 @@ def evidence_of(observation: Observation, T_world_camera: Float[ndarray, "4 4"])
             points.append(observation.points_camera[rows[kept], columns[kept]])
             weights.append(np.full(kept.sum(), area / kept.sum()))
         ends[part] = sum(map(len, points))
+    nearest = cv2.erode(np.where(z > 0, z, np.inf), np.ones((3, 3), np.uint8))
     away = cv2.distanceTransform((labels == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     return Evidence(
         transform_points(T_world_camera, np.concatenate(points)),
         np.concatenate(weights),
         ends,
-        z,
+        np.where((labels > 0) | (z == 0), z, nearest),
         away,
         labels,
         camera,
