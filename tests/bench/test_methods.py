@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from kintrack.bench.cases import CONDITIONS, Case
-from kintrack.bench.digest import result_digest
+from kintrack.bench.digest import code_of, result_digest
 from kintrack.bench.methods import methods_of
 from kintrack.errors import ConfigError
 
@@ -77,6 +77,16 @@ def test_a_kept_result_is_told_by_weights_start_and_recordings(tmp_path):
     }  # fmt: skip
     assert len(known) == 6
     assert result_digest(False, a, [False], ["x", "y"]) in known
+
+
+def test_words_do_not_count_as_code(tmp_path):
+    text = '"""A."""\nx = 1\ndef f():\n    """B."""\n    return "C"\n'
+    changed = [text.replace(letter, "Z") for letter in "ABC"] + [text + "# D\n"]
+    path, codes = tmp_path / "x.py", []
+    for one in (text, *changed):
+        path.write_text(one)
+        codes.append(code_of(path))
+    assert [code == codes[0] for code in codes] == [True, True, True, False, True]
 
 
 def test_conditions_name_their_distance_and_their_folder():

@@ -93,4 +93,19 @@ def _content(path: Path | None) -> str:
 
 
 def _trees(paths: Iterable[Path]) -> bytes:
-    return b"".join(ast.dump(ast.parse(path.read_bytes())).encode() for path in paths)
+    return b"".join(code_of(path) for path in paths)
+
+
+def code_of(path: Path) -> bytes:
+    """What a Python file does: its syntax tree without layout, comments and docstrings."""
+    tree = ast.parse(path.read_bytes())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            node.body = [line for line in node.body if not _is_text(line)]
+    return ast.dump(tree).encode()
+
+
+def _is_text(line: ast.stmt) -> bool:
+    """Whether a statement is a string alone, as docstrings are."""
+    value = line.value if isinstance(line, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)

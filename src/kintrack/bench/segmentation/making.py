@@ -7,7 +7,6 @@ is asked for.
 
 from __future__ import annotations
 
-import ast
 import os
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -22,7 +21,7 @@ import numpy as np
 import kintrack.labelling
 from kintrack.bench import running
 from kintrack.bench.cases import REDRAWS, SHARE, pitch_of
-from kintrack.bench.digest import code_digest
+from kintrack.bench.digest import code_digest, code_of
 from kintrack.bench.inserting import view_of
 from kintrack.bench.made import MADE_FILE, finish, is_made, recipe_of
 from kintrack.errors import SceneError
@@ -219,8 +218,7 @@ def _index(folder: Path) -> bytes:
 def _labelling_digest() -> str:
     """Of the code that fits the body and makes labels of it."""
     folder = Path(kintrack.labelling.__file__).parent
-    trees = [ast.dump(ast.parse(path.read_bytes())) for path in sorted(folder.glob("*.py"))]
-    return recipe_of(code_digest(), *trees)
+    return recipe_of(code_digest(), *map(code_of, sorted(folder.glob("*.py"))))
 
 
 def _fresh(folder: Path) -> None:

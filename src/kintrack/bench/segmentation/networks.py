@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import segmentation
+from kintrack.bench.digest import code_of
 from segmentation.runtime import NetworkSegmenter, RuntimeConfig, segmenter
 from segmentation.weights import Weights, load_weights
 
@@ -75,11 +75,11 @@ def load_networks(files: Mapping[str, Path], runtime: str = "auto") -> list[Netw
 
 
 def judging_digest() -> str:
-    """SHA-256 over the code that decides labels and counts; layout and comments do not count."""
+    """SHA-256 over the code that decides labels and counts; comments and docstrings do not count."""
     deciding = Path(segmentation.__file__).parent
     paths = [deciding / f"{name}.py" for name in DECIDING]
     paths += [Path(__file__).parent / f"{name}.py" for name in JUDGING]
     digest = hashlib.sha256()
     for path in paths:
-        digest.update(ast.dump(ast.parse(path.read_bytes())).encode())
+        digest.update(code_of(path))
     return digest.hexdigest()
