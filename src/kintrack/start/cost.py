@@ -23,8 +23,8 @@ FACING = 0.1
 AT_REST_M2 = 4e-4
 """What a limb that is not at rest costs more, in squared metres of mean distance [m^2]."""
 UNSEEN_M2, UNSEEN_M4 = 0.02, 3e-4
-"""A limb that shows less than this [m^2] costs up to this more [m^4] if it is not at rest; an unseen
-leg rests as the other one is."""
+"""A limb that shows less than this [m^2] costs up to this more [m^4] if it is not at rest; an
+unseen leg rests as the other one is."""
 OTHER_PART_M = 0.06
 """What skin costs that lies on pixels of another part [m]."""
 NEAR_M = 0.05

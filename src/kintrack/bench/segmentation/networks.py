@@ -75,7 +75,7 @@ def load_networks(files: Mapping[str, Path], runtime: str = "auto") -> list[Netw
 
 
 def judging_digest() -> str:
-    """SHA-256 over the code that decides labels and counts; comments and docstrings do not count."""
+    """SHA-256 over the code that decides labels and counts; comments and docstrings do not."""
     deciding = Path(segmentation.__file__).parent
     paths = [deciding / f"{name}.py" for name in DECIDING]
     paths += [Path(__file__).parent / f"{name}.py" for name in JUDGING]
