@@ -43,7 +43,24 @@ def test_errors_and_their_doubt_are_told(tables, row):
 
 
 def test_the_same_person_is_compared_over_recordings(tables, row):
-    rows = [row(f"{a}_s1_t1", "calibrated", off) for a, off in (("a03", 0.0), ("a22", 0.03))]
+    rows = [
+        row(f"{a}_s1_t1", "calibrated", off, labels="none")
+        for a, off in (("a03", 0.0), ("a22", 0.03))
+    ]
     text = tables.real_tables(rows)
     assert "| s1 | 1.700, 1.730 | 3.0 | 1.5 |" in text
     assert "| calibrated in the first second | 3.00 | 12.0 | 100 % | 2 of 2 |" in text
+
+
+def test_targets_are_met_or_missed(tables, row):
+    rows = [row("00", body, 0.01) for body in ("calibrated", "deformable")]
+    for action, off_m in (("a03", 0.0), ("a22", 0.03)):
+        for body in ("template", "calibrated", "deformable"):
+            rows.append(row(f"{action}_s1_t1", body, off_m, labels="none"))
+    text = tables.targets(rows)
+    assert "| height, calibrated, true labels | 1 cm | at most 1.5 cm | pass |" in text
+    assert "| limbs, calibrated, the worst of four | 10 % | at most 4 % | **fail** |" in text
+    assert "| joints, calibrated | 3 cm | at most 2 cm | **fail** |" in text
+    assert "| UTD-MHAD: surface nearer than template's | 0 % | at least 25 % | **fail** |" in text
+    assert "| UTD-MHAD: heights of one person differ | 3 cm | at most 2 cm | **fail** |" in text
+    assert "labels by the network" not in text

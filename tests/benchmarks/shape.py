@@ -26,7 +26,7 @@ import report
 from command import OUT, parser, refuse_quick_baseline, run
 from shape_figure import draw
 from shape_scoring import Row, joint_error_m, lengths_of, tracked, true_lengths
-from shape_tables import real_tables, synthetic_tables
+from shape_tables import real_tables, synthetic_tables, targets
 
 from kintrack.bench.cases import pitch_of
 from kintrack.calibration.config import BodyKind
@@ -88,7 +88,8 @@ def main() -> int:
     rows = _run(jobs, arguments.jobs)
     made_up = [row for row in rows if np.isfinite(row.height_m)]
     real = [row for row in rows if not np.isfinite(row.height_m)]
-    text = synthetic_tables(made_up) + ("\n\n" + real_tables(real) if real else "")
+    text = f"{targets(rows)}\n\n{synthetic_tables(made_up)}"
+    text += "\n\n" + real_tables(real) if real else ""
     print(text)
     write_json(folder / f"{arguments.people}.json", {"rows": [asdict(row) for row in rows]})
     if arguments.people == "held-out" and not arguments.quick:

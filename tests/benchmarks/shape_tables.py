@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from baseline import Metric, target_table
 from numpy import ndarray
 from report import table
 from shape_scoring import Row
@@ -14,7 +15,7 @@ from shape_scoring import Row
 from kintrack.calibration.measures import LIMBS
 
 TITLES = {
-    "average": "average adult",
+    "average": "average adult in average clothes",
     "template": "template, sized in the first frame",
     "calibrated": "calibrated in the first second",
     "deformable": "the same, and deformable",
@@ -22,6 +23,46 @@ TITLES = {
 }
 """Body -> words; the order of the tables."""
 LABELS = {"recording": "true labels", "network": "labels by the network that ships"}
+
+
+def targets(rows: Sequence[Row]) -> str:
+    """What is asked for against what was measured: synthetic people, then real ones."""
+    found: list[Metric] = []
+    for labels, words in LABELS.items():
+        known, soft = (_chosen(rows, labels, body) for body in ("calibrated", "deformable"))
+        if not known:
+            continue
+        limbs = [np.mean([abs(_limb(row, name)) for row in known]) for name in LIMBS]
+        found += [
+            _metric(f"height, calibrated, {words}", 100 * _mean(_height_errors(known)), "cm", 1.5),
+            _metric("limbs, calibrated, the worst of four", 100 * float(max(limbs)), "%", 4.0),
+            _metric("joints, calibrated", 100 * _mean(r.joints_m for r in known), "cm", 2.0),
+            _metric("surface, deformable", 1e3 * _mean(r.surface_m for r in soft), "mm", 5.0),
+        ]
+    bare, soft = (_chosen(rows, "none", body) for body in ("template", "deformable"))
+    if bare and soft:
+        less = 1 - _mean(r.surface_m for r in soft) / _mean(r.surface_m for r in bare)
+        further = _mean(r.joints_m for r in soft) - _mean(r.joints_m for r in bare)
+        spans = [np.ptp(heights) for heights in _heights(rows).values()]
+        found += [
+            _metric("UTD-MHAD: surface nearer than template's", 100 * less, "%", 25.0, "higher"),
+            _metric("UTD-MHAD: further from the Kinect's joints", 100 * further, "cm", 0.0),
+            _metric("UTD-MHAD: heights of one person differ", 100 * float(max(spans)), "cm", 2.0),
+        ]
+    note = "Mean errors; the surface is a root mean square; of the heights the most."
+    return f"{target_table(found)}\n\n{note}"
+
+
+def _metric(says: str, value: float, unit: str, target: float, better: str = "lower") -> Metric:
+    return Metric(says, says, value, unit, better, 0.0, target)
+
+
+def _chosen(rows: Sequence[Row], labels: str, body: str) -> list[Row]:
+    return [row for row in rows if row.labels == labels and row.body == body]
+
+
+def _height_errors(rows: Sequence[Row]) -> list[float]:
+    return [abs(row.height_error_m) for row in rows]
 
 
 def synthetic_tables(rows: Sequence[Row]) -> str:
@@ -96,11 +137,7 @@ def _scatter(z: ndarray) -> str:
 def real_tables(rows: Sequence[Row]) -> str:
     """Heights of the same person from different recordings, and what each switch buys."""
     spans = []
-    heights: dict[str, list[float]] = defaultdict(list)
-    for row in rows:
-        if row.body == "calibrated" and row.used == "calibrated" and row.height is not None:
-            heights[row.name.split("_")[1]].append(row.height.value_m)
-    for who, found in sorted(heights.items()):
+    for who, found in sorted(_heights(rows).items()):
         spans.append(
             [
                 who,
@@ -128,6 +165,16 @@ def real_tables(rows: Sequence[Row]) -> str:
             ),
         ]
     )
+
+
+def _heights(rows: Sequence[Row]) -> dict[str, list[float]]:
+    """Heights of every real person who was calibrated [m]."""
+    found: dict[str, list[float]] = defaultdict(list)
+    for row in rows:
+        known = row.labels == "none" and row.body == row.used == "calibrated"
+        if known and row.height is not None:
+            found[row.name.split("_")[1]].append(row.height.value_m)
+    return found
 
 
 def _mean(values: Iterable[float]) -> float:
