@@ -16,6 +16,10 @@ from kintrack.objective_config import MotionConfig
 from kintrack.residuals.pose_prior import LegPrior
 from kintrack.residuals.prior import TangentPrior, diagonal_prior, gaussian_prior
 
+MOST_DOUBT = 10.0
+"""Standard deviation of what a frame says nothing about [m, rad]; a matrix whose doubts span more
+orders of magnitude cannot be inverted again."""
+
 
 @dataclass(frozen=True)
 class Belief:
@@ -39,6 +43,11 @@ class Belief:
     def step_s(self, timestamp_s: float) -> float:
         """Time from here to a later frame, at least a millisecond [s]."""
         return max(timestamp_s - self.timestamp_s, 1e-3)
+
+
+def covariance_of(H: Float[ndarray, "nv nv"]) -> Float[ndarray, "nv nv"]:
+    """Covariance of a pose, from the matrix of its normal equations; H may be singular."""
+    return np.linalg.inv(H + np.eye(len(H)) / MOST_DOUBT**2)
 
 
 def first(

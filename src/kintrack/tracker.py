@@ -14,7 +14,14 @@ from numpy import ndarray
 from kintrack.alignment import Fit, fit_pose, view_skin
 from kintrack.association.observation import Observation, box_around, observe, within
 from kintrack.begin import begin
-from kintrack.belief import awaited_state, coasted, first, tracking_priors, updated
+from kintrack.belief import (
+    awaited_state,
+    coasted,
+    covariance_of,
+    first,
+    tracking_priors,
+    updated,
+)
 from kintrack.body import BodyState, run_kinematics
 from kintrack.deformation.surface import followed
 from kintrack.errors import AssociationError
@@ -250,7 +257,7 @@ class Tracker(Memory):
         if self.belief is not None and agreed.seen < LEAST_SEEN:
             return self._miss(frame, observation, began)
         H, _, _ = normal_equations(fit.state, [fit.surface, *priors])
-        covariance = np.linalg.inv(H + 1e-9 * np.eye(body.nv))
+        covariance = covariance_of(H)
         last, now_s, q = self.belief, frame.timestamp_s, fit.state.q
         if last is None:
             self.belief = first(q, covariance, now_s)
