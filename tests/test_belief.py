@@ -2,9 +2,10 @@
 import numpy as np
 import pytest
 
-from kintrack.belief import coasted, first, predict, spread, updated
+from kintrack.belief import coasted, covariance_of, first, predict, spread, updated
 from kintrack.human import prior_sigma
 from kintrack.objective_config import MotionConfig, PriorConfig
+from kintrack.residuals.prior import gaussian_prior
 
 MOTION = MotionConfig()
 DT_S = 1 / 30
@@ -78,3 +79,12 @@ def test_a_prediction_stays_within_the_limits(body, belief):
     fast.velocity[6:] = 500.0
     q = predict(body, fast, DT_S, MOTION)
     assert (q[7:] <= body.upper[6:]).all() and (q[7:] >= body.lower[6:]).all()
+
+
+def test_a_direction_that_nothing_is_known_of_can_be_a_prior(body, belief):
+    turned = np.linalg.qr(np.random.default_rng(0).normal(size=(body.nv, body.nv)))[0]
+    known = np.geomspace(1e6, 1.0, body.nv)
+    known[-1] = 0.0
+    covariance = covariance_of(turned * known @ turned.T)
+    assert np.sqrt(np.linalg.eigvalsh(covariance).max()) == pytest.approx(10.0, rel=1e-3)
+    assert np.isfinite(gaussian_prior(belief.q, covariance).root).all()
