@@ -26,6 +26,12 @@ POSES = {
 }
 
 
+@pytest.fixture(scope="module")
+def human(scene):
+    """Who is filmed."""
+    return scene.human
+
+
 def weak_prior(human, q):
     return diagonal_prior(q, 3 * prior_sigma(human.body, CONFIG.prior))
 

@@ -27,6 +27,7 @@ ROWS = (
     ("skin",),
     ("human",),
     ("shape",),
+    ("clothing",),
     ("sequence", "segmenter"),
     ("association",),
     ("deformation",),

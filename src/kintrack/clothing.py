@@ -9,6 +9,7 @@ sides and in every pose, plus folds. Means and spreads are those of 60 dressed t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -106,13 +107,13 @@ def dressed_human(
     Raises:
         ModelError: if a model file is broken or does not have that many coefficients.
     """
+    bare = load_human(folder, shape)
     if not clothing_m:
-        return load_human(folder, shape)
+        return bare
     space = load_shape_space(folder)
     b, worn = checked_shape(space, shape), [clothing_m[region.name] for region in REGIONS]
     skin = _wardrobe(folder).bound(np.concatenate([b, worn]))
-    told = np.zeros(0) if shape is None else np.array(shape)
-    return Human(space.body(b), skin, told, folder, dict(clothing_m))
+    return replace(bare, skin=skin, clothing_m=dict(clothing_m))
 
 
 @cache

@@ -15,6 +15,12 @@ FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 COLORS = np.arange(12, dtype=np.uint8).reshape(4, 3)
 
 
+@pytest.fixture(scope="module")
+def human(scene):
+    """Who is filmed."""
+    return scene.human
+
+
 def test_a_ply_file_holds_vertices_colours_values_and_triangles(tmp_path):
     path = tmp_path / "a.ply"
     write_ply(path, VERTICES, FACES, COLORS, {"offset_m": np.array([0.0, 0.01, 0.02, 0.03])})
