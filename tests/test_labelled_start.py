@@ -3,12 +3,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from kintrack.config import TrackerConfig
 from kintrack.errors import ConfigError
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA as T
-from kintrack.geometry import transform_points
 from kintrack.human import ARMS_OUT_DEG, SITTING_DEG
 from kintrack.joints import JOINT_NAMES
 from kintrack.labelled_config import LabelledStartConfig
@@ -33,12 +31,6 @@ def errors(scene, q, found):
     return np.linalg.norm(found.fit.state.joint_positions_world - world_joints(scene, q), axis=1)
 
 
-def shown(scene, q, observation):
-    """Joints with a seen point of the person near; the shins of who sits facing away are hidden."""
-    points = transform_points(T, observation.points_camera[observation.region])
-    return cKDTree(points).query(world_joints(scene, q))[0] < 0.15
-
-
 @pytest.mark.parametrize("heading_deg", [0, 70, 135, 180, -110])
 @pytest.mark.parametrize(
     "degrees", [STEPPING_DEG, SITTING_DEG, ARMS_OUT_DEG], ids=["stepping", "sitting", "arms out"]
@@ -47,9 +39,7 @@ def test_somebody_is_found_at_any_heading(scene, degrees, heading_deg):
     q = scene.place(degrees, heading_deg, at=(2.9, 0.2, 0.0))
     observation = labelled(scene, q)
     found = start_from_labels(scene.human, observation, T, CONFIG)
-    away, seen = errors(scene, q, found), shown(scene, q, observation)
-    assert seen.mean() > 0.5
-    assert away[seen].mean() < 0.08
+    assert errors(scene, q, found).mean() < 0.08
     assert found.agreed.explained > 0.9
 
 

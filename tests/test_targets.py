@@ -10,6 +10,12 @@ from kintrack.targets import JOINT_OF_PART, TargetConfig, find_targets
 from labelled_people import board, labelled
 
 
+@pytest.fixture(scope="module")
+def scene(scene, human):
+    """Filmed bare: the head is as small as the wrong labels beside it."""
+    return replace(scene, human=human)
+
+
 def names(targets):
     return [LABELS[part] for part in targets.parts]
 
@@ -42,7 +48,7 @@ def test_wrong_labels_far_away_do_not_move_a_target(scene):
     assert np.allclose(right.places_camera, moved.places_camera, atol=0.03)
     head = labels == LABELS.index("head")
     mean = observation.points_camera[head].mean(axis=0)
-    assert np.linalg.norm(mean - right.places_camera[0]) > 0.2
+    assert np.linalg.norm(mean - right.places_camera[0]) > 0.3
 
 
 def test_parts_that_hardly_show_have_none(scene):
