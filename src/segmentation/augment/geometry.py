@@ -16,7 +16,7 @@ from jaxtyping import Float, Int, UInt8
 from numba import njit
 from numpy import ndarray
 
-from segmentation.labels import IGNORED, INPUT_HEIGHT, INPUT_WIDTH, MIRRORED
+from segmentation.labels import BACKGROUND, IGNORED, INPUT_HEIGHT, INPUT_WIDTH, MIRRORED
 from segmentation.picture import Picture
 from segmentation.preprocess import REFERENCE_DEPTH_M, letterbox
 from segmentation.region import cells_per_pixel
@@ -147,7 +147,8 @@ def warped(
     """The view as a picture of the network's size.
 
     Four points a cell are looked up; a cell takes the lower median of their readings and the most
-    frequent label, the lowest of equals. What lies outside is a hole to be ignored.
+    frequent label of them, of equals that of the reading taken: where a person's outline halves a
+    cell, depth and label are hers. What lies outside is a hole to be ignored.
 
     Args:
         picture: What is looked at.
@@ -185,32 +186,43 @@ def _warp(depth, labels, M, swap, window_columns, window_rows, out, out_labels):
     for i in range(top, top + window_rows):
         for j in range(left, left + window_columns):
             inside = n = 0
+            unread = np.uint8(BACKGROUND)
             for k in range(4):
                 u, v = j - 0.25 + 0.5 * (k % 2), i - 0.25 + 0.5 * (k // 2)
                 x = int(np.floor(M[0, 0] * u + M[0, 1] * v + M[0, 2] + 0.5))
                 y = int(np.floor(M[1, 0] * u + M[1, 1] * v + M[1, 2] + 0.5))
-                if 0 <= x < width and 0 <= y < height:
-                    label = labels[y, x]
-                    seen[inside] = swap[label] if label < swap.size else label
-                    inside += 1
-                    if depth[y, x] > 0.0:
-                        at = n
-                        while at > 0 and readings[at - 1] > depth[y, x]:
-                            readings[at] = readings[at - 1]
-                            at -= 1
-                        readings[at] = depth[y, x]
-                        n += 1
+                if not (0 <= x < width and 0 <= y < height):
+                    continue
+                inside += 1
+                label = labels[y, x]
+                if depth[y, x] <= 0.0:
+                    unread = label if label == IGNORED else unread
+                    continue
+                at = n
+                while at > 0 and readings[at - 1] > depth[y, x]:
+                    readings[at], seen[at] = readings[at - 1], seen[at - 1]
+                    at -= 1
+                readings[at] = depth[y, x]
+                seen[at] = swap[label] if label < swap.size else label
+                n += 1
             if 2 * inside < 4:
                 continue
-            most = 0
-            for k in range(inside):
-                votes = 0
-                for m in range(inside):
-                    votes += seen[m] == seen[k]
-                if votes > most or (votes == most and seen[k] < out_labels[i, j]):
-                    most = votes
-                    out_labels[i, j] = seen[k]
-            if n > 0 and 2 * n >= inside:
-                out[i, j] = readings[(n - 1) // 2]
-            elif out_labels[i, j] != 255:
-                out_labels[i, j] = 0
+            if n == 0 or 2 * n < inside:
+                out_labels[i, j] = unread
+                continue
+            out[i, j] = readings[(n - 1) // 2]
+            out_labels[i, j] = _most_frequent(seen, n)
+
+
+@njit(cache=True)
+def _most_frequent(labels, count):
+    """Of equals the middle one, else the first."""
+    best, most = (count - 1) // 2, 0
+    for k in range(-1, count):
+        candidate = best if k < 0 else k
+        votes = 0
+        for m in range(count):
+            votes += labels[m] == labels[candidate]
+        if votes > most:
+            best, most = candidate, votes
+    return labels[best]
