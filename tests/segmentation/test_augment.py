@@ -9,7 +9,7 @@ from training_data import CAMERA, PAINT, figure, picture, squares
 
 from segmentation.augment.bank import BankConfig, load_bank
 from segmentation.augment.color import recolored
-from segmentation.augment.geometry import Warp, draw_warp, warped, whole
+from segmentation.augment.geometry import Warp, around, draw_warp, warped, whole
 from segmentation.augment.insertion import insert, person_of, put_behind, without_background
 from segmentation.augment.noise import MOST_ABSORBED, SensorFaults, absorbed, spoilt
 from segmentation.augment.sample import AugmentConfig, Bank, augmented, changed, plain_sample
@@ -97,6 +97,17 @@ def test_zooming_in_looks_like_coming_nearer(level):
         if seen.sum() > 20:
             assert np.median(D[seen]) == pytest.approx(np.median(D_near[expected]), abs=1e-3)
     assert (zoomed.labels == 2).sum() > 20
+
+
+@pytest.mark.parametrize("column", range(90, 96))
+def test_a_cell_that_an_outline_halves_is_whose_reading_it_takes(column):
+    depth, labels = np.full((159, 192), 3.0, np.float32), np.zeros((159, 192), np.uint8)
+    depth[:, column:], labels[:, column:] = 2.0, 3
+    depth[:, column + 40 :], labels[:, column + 40 :] = 1.0, 0
+    one = Picture(depth, None, labels, 137.0)
+    for warp in (whole(one), around(one, np.flatnonzero(labels))):
+        view = warped(one, warp)
+        assert ((view.labels == 3) == (view.depth_m == 2.0)).all()
 
 
 def test_bars_are_ignored_holes_without_colour():
