@@ -98,6 +98,18 @@ def test_after_a_rejected_first_pose_some_frames_pass():
     assert life.may_begin
 
 
+def test_what_is_rejected_again_and_again_is_tried_less_and_less_until_it_leaves():
+    life, waits = Life(), []
+    for _ in range(CONFIG.keen + 6):
+        life = judged(life, BAD, CONFIG)
+        waits.append(life.wait)
+        life = replace(life, wait=0)
+    assert waits[: CONFIG.keen] == [CONFIG.retry] * CONFIG.keen
+    assert waits[CONFIG.keen : CONFIG.keen + 2] == [2 * CONFIG.retry, 4 * CONFIG.retry]
+    assert waits[-1] == CONFIG.most_retry
+    assert judged(unbegun(life, CONFIG, in_view=False), BAD, CONFIG).wait == CONFIG.retry
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [

@@ -47,11 +47,26 @@ class LifecycleConfig:
     """Bad frames in a row that end a young track."""
     retry: int = 2
     """After a first pose was rejected, so many frames pass before the next is tried."""
+    keen: int = 4
+    """So many first poses are tried at this pace; then the frames between double every time."""
+    most_retry: int = 16
+    """At most so many frames pass, for what looks like a person and is none."""
 
     def __post_init__(self) -> None:
         check_bounds(
-            self, patience=(1, 1000), young=(0, 1000), young_patience=(1, 1000), retry=(0, 1000)
+            self,
+            patience=(1, 1000),
+            young=(0, 1000),
+            young_patience=(1, 1000),
+            retry=(0, 1000),
+            keen=(1, 1000),
+            most_retry=(0, 1000),
         )
+
+    def retry_after(self, rejected: int) -> int:
+        """Frames to pass after so many first poses were rejected in a row."""
+        doubled = self.retry * 2 ** min(max(rejected - self.keen, 0), 10)
+        return min(doubled, max(self.most_retry, self.retry))
 
 
 @dataclass(frozen=True)

@@ -55,6 +55,8 @@ class Life:
     """Bad frames in a row."""
     wait: int = 0
     """Frames to pass before the next first pose is tried."""
+    rejected: int = 0
+    """First poses rejected since somebody is in view."""
 
     @property
     def tracks(self) -> bool:
@@ -88,8 +90,10 @@ def unbegun(life: Life, config: LifecycleConfig, in_view: bool) -> Life:
         config: When a track ends.
         in_view: Whether the person is in view; then the last objection still stands.
     """
+    if in_view:
+        return absent(life, config, life.reason or UNFITTED)
     missing = GONE if life.status == "lost" else NOBODY
-    return absent(life, config, (life.reason or UNFITTED) if in_view else missing)
+    return replace(absent(life, config, missing), rejected=0)
 
 
 def judged(life: Life, reading: Reading, config: LifecycleConfig) -> Life:
@@ -106,7 +110,9 @@ def judged(life: Life, reading: Reading, config: LifecycleConfig) -> Life:
             return _worse(life, config, wrong)
         return replace(life, reason=None, good=life.good + 1, bad=0)
     if wrong is not None:
-        return replace(life, reason=wrong, wait=config.retry)
+        rejected = life.rejected + 1
+        wait = config.retry_after(rejected)
+        return replace(life, reason=wrong, wait=wait, rejected=rejected)
     return Life("tracking", None, good=1)
 
 
