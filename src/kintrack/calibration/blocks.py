@@ -133,6 +133,7 @@ def surface_of(
         gate_m,
         config.pixel_pairs,
         human.skin.labels,
+        a.part_m,
     )
     vertices = transform_points(T_world_camera, view.vertices_camera)
     normals = view.normals_camera @ T_world_camera[:3, :3].T
@@ -158,6 +159,7 @@ def surface_of(
         view.visible,
         a.silhouette_tolerance_m,
         a.silhouette_gate_m,
+        tracker.occlusion.behind_m,
     )
     outline = silhouette_residual(
         human.skin,
