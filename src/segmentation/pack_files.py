@@ -23,7 +23,7 @@ from segmentation.picture import HEIGHT, WIDTH, Picture
 
 DEPTH_UNIT_M = 0.00025
 """Metres per unit of packed depth: 16 bits reach 16.4 m."""
-HEADER = {"version": 2, "width": WIDTH, "height": HEIGHT, "depth_unit_m": DEPTH_UNIT_M}
+HEADER = {"version": 3, "width": WIDTH, "height": HEIGHT, "depth_unit_m": DEPTH_UNIT_M}
 HEADER_FILE, INDEX_FILE = "pack.json", "sequences.jsonl"
 
 

@@ -14,6 +14,7 @@ from numpy import ndarray
 from kintrack.errors import DatasetError
 from kintrack.sequence.frame import Frame
 from segmentation.labels import BACKGROUND, IGNORED, LABELS
+from segmentation.preprocess import cell_bounds
 
 WIDTH, HEIGHT = 192, 159
 """Largest picture [px]."""
@@ -40,8 +41,9 @@ def reduced(
 ) -> Picture:
     """A frame at the size in which it is packed.
 
-    Depth is a reading that was there, the lower median of a cell's; labels are a cell's most
-    frequent, as in `preprocess.py`. A frame smaller than a pack's pictures is kept as it is.
+    Depth is a reading that was there, the lower median of a cell's, as in `preprocess.py`; labels
+    are the most frequent of a cell's readings, of equals that of the reading taken, so that both
+    show one surface. A frame smaller than a pack's pictures is kept as it is.
 
     Args:
         depth_m: Depth [m], finite, 0 = no reading, shape (h, w).
@@ -78,37 +80,45 @@ def checked(frame: Frame, where: object) -> None:
 
 
 @njit(cache=True, nogil=True)
+def most_frequent(labels, count):
+    """The most frequent of the first labels; of equals the middle one's, else the first's."""
+    best, most = labels[0], 0
+    for k in range(-1, count):
+        label, votes = labels[(count - 1) // 2 if k < 0 else k], 0
+        for m in range(count):
+            votes += labels[m] == label
+        if votes > most:
+            best, most = label, votes
+    return best
+
+
+@njit(cache=True, nogil=True)
 def _reduce(depth, labels, out, votes):
     height, width = depth.shape
     rows, columns = out.shape
     tall, wide = labels.shape
-    side_v, side_u = height // rows + 2, width // columns + 2
-    found = np.empty(side_v * side_u, dtype=np.float32)
-    count = np.empty(8, dtype=np.int64)
+    most = (height // rows + 2) * (width // columns + 2)
+    found, seen = np.empty(most, dtype=np.float32), np.empty(most, dtype=np.uint8)
     for i in range(rows):
-        v0, v1 = i * height // rows, max(i * height // rows + 1, (i + 1) * height // rows)
+        v0, v1 = cell_bounds(i, rows, height)
         for j in range(columns):
-            u0, u1 = j * width // columns, max(j * width // columns + 1, (j + 1) * width // columns)
-            count[:] = 0
+            u0, u1 = cell_bounds(j, columns, width)
             n = 0
+            unread = np.uint8(BACKGROUND)
             for v in range(v0, v1):
                 y = (2 * v + 1) * tall // (2 * height)
                 for u in range(u0, u1):
-                    label = labels[y, (2 * u + 1) * wide // (2 * width)]
-                    count[min(label, 7)] += 1
-                    d = depth[v, u]
-                    if d > 0.0:
-                        k = n
-                        while k > 0 and found[k - 1] > d:
-                            found[k] = found[k - 1]
-                            k -= 1
-                        found[k] = d
-                        n += 1
+                    label, d = labels[y, (2 * u + 1) * wide // (2 * width)], depth[v, u]
+                    if d <= 0.0:
+                        unread = label if label == IGNORED else unread
+                        continue
+                    k = n
+                    while k > 0 and found[k - 1] > d:
+                        found[k], seen[k] = found[k - 1], seen[k - 1]
+                        k -= 1
+                    found[k], seen[k] = d, label
+                    n += 1
             if n > 0 and 2 * n >= (v1 - v0) * (u1 - u0):
-                out[i, j] = found[(n - 1) // 2]
-            best = 0
-            for label in range(1, 8):
-                if count[label] > count[best]:
-                    best = label
-            best = IGNORED if best == 7 else best
-            votes[i, j] = best if out[i, j] > 0.0 or best == IGNORED else BACKGROUND
+                out[i, j], votes[i, j] = found[(n - 1) // 2], most_frequent(seen, n)
+            else:
+                votes[i, j] = unread

@@ -205,9 +205,9 @@ def _count_suspect(bits):
     return count
 
 
-@njit(cache=True)
-def _bounds(i, cells, pixels):
-    """The pixels whose centre lies in cell i, or the one in which the centre of cell i lies."""
+@njit(cache=True, nogil=True)
+def cell_bounds(i, cells, pixels):
+    """The range of pixels whose centre lies in cell i, or of the one in which its centre lies."""
     if pixels < cells:
         first = (2 * i + 1) * pixels // (2 * cells)
         return first, first + 1
@@ -222,7 +222,7 @@ def _samples(cells, pixels):
     at = np.zeros((cells, SAMPLES), dtype=np.int64)
     count = np.empty(cells, dtype=np.int64)
     for i in range(cells):
-        first, last = _bounds(i, cells, pixels)
+        first, last = cell_bounds(i, cells, pixels)
         count[i] = min(SAMPLES, last - first)
         for k in range(count[i]):
             at[i, k] = first + (2 * k + 1) * (last - first) // (2 * count[i])
@@ -255,9 +255,9 @@ def _fill_depth(depth, fit, unit, out):
 @njit(cache=True)
 def _fill_labels(labels, fit, out):
     for i in range(fit.rows):
-        v0, v1 = _bounds(i, fit.rows, fit.height)
+        v0, v1 = cell_bounds(i, fit.rows, fit.height)
         for j in range(fit.columns):
-            u0, u1 = _bounds(j, fit.columns, fit.width)
+            u0, u1 = cell_bounds(j, fit.columns, fit.width)
             votes = np.zeros(256, dtype=np.int64)
             best = labels[v0, u0]
             for v in range(v0, v1):

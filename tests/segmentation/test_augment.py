@@ -9,7 +9,7 @@ from training_data import CAMERA, PAINT, figure, picture, squares
 
 from segmentation.augment.bank import BankConfig, load_bank
 from segmentation.augment.color import recolored
-from segmentation.augment.geometry import Warp, around, draw_warp, warped, whole
+from segmentation.augment.geometry import Warp, around, draw_around, draw_warp, warped, whole
 from segmentation.augment.insertion import insert, person_of, put_behind, without_background
 from segmentation.augment.noise import MOST_ABSORBED, SensorFaults, absorbed, spoilt
 from segmentation.augment.sample import AugmentConfig, Bank, augmented, changed, plain_sample
@@ -156,6 +156,24 @@ def test_a_person_in_another_room_keeps_her_pixels_and_gets_its_walls():
     assert (out.color[person] == view.color[person]).all()
     assert (out.color[~person] == 7).all() and (out.depth_m[~person] > 2.9).all()
     assert person.sum() > 0.6 * person_of(view.labels).sum()
+
+
+def test_a_bar_stays_a_bar_in_another_room():
+    view = warped(picture(2), Warp(2 / 3, (95.5, 79.0), window=(128, 72)))
+    out = put_behind(view, warped(room(), whole(room())), 0.4, np.random.default_rng(0))
+    bar = view.labels == IGNORED
+    assert bar.sum() == 34 * 128 and (out.labels[bar] == IGNORED).all()
+    assert (out.depth_m[bar] == 0).all()
+
+
+def test_who_is_too_near_for_a_closer_look_is_seen_in_the_picture_as_it_is():
+    depth, color, labels = figure(0)
+    person = np.flatnonzero(labels)
+    near, far = (Picture(k * depth, color, labels, CAMERA.fx) for k in (0.2, 1.5))
+    rng = np.random.default_rng(0)
+    assert around(near, person) == draw_around(near, person, rng, 6.0) == whole(near)
+    assert around(far, person).zoom > whole(far).zoom
+    assert draw_around(far, person, rng, 6.0) != whole(far)
 
 
 def test_a_removed_background_leaves_the_person_alone():

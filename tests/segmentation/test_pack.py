@@ -90,6 +90,15 @@ def test_depth_is_a_reading_that_was_there_and_labels_are_the_most_frequent():
     assert 0.2 < (one.depth_m == 0).mean() < 0.9
 
 
+def test_depth_and_label_of_a_cell_are_of_one_surface():
+    v, u = np.mgrid[:240, :320]
+    disc = np.hypot(u - 160.3, v - 121.7) < 50
+    depth, labels = np.where(disc, 2.0, 3.0).astype(np.float32), np.where(disc, 3, 0)
+    depth[np.random.default_rng(0).random(depth.shape) < 0.2] = 0.0
+    one = reduced(depth, None, labels.astype(np.uint8), 280.0)
+    assert ((one.labels == 3) == (one.depth_m == 2.0)).all() and (one.labels == 3).sum() > 2000
+
+
 def test_a_label_that_is_none_is_named_with_its_file(root):
     path = sorted((root / "r3/labels").glob("*.png"))[1]
     cv2.imwrite(str(path), np.full((159, 192), 9, np.uint8))

@@ -17,7 +17,7 @@ from numba import njit
 from numpy import ndarray
 
 from segmentation.labels import BACKGROUND, IGNORED, INPUT_HEIGHT, INPUT_WIDTH, MIRRORED
-from segmentation.picture import Picture
+from segmentation.picture import Picture, most_frequent
 from segmentation.preprocess import REFERENCE_DEPTH_M, letterbox
 from segmentation.region import cells_per_pixel
 
@@ -90,7 +90,7 @@ def draw_warp(
 
 
 def around(picture: Picture, person: Int[ndarray, " n"]) -> Warp:
-    """The window of a closer look at a person (`region.py`).
+    """The window of a closer look at a person (`region.py`); the picture if that is no closer.
 
     Args:
         picture: The picture.
@@ -99,7 +99,9 @@ def around(picture: Picture, person: Int[ndarray, " n"]) -> Warp:
     v, u = np.divmod(person, picture.labels.shape[1])
     depths = picture.depth_m.ravel()[person]
     depth = float(np.median(depths[depths > 0])) if (depths > 0).any() else REFERENCE_DEPTH_M
-    zoom = cells_per_pixel(depth, picture.focal_px)
+    zoom, all_of_it = cells_per_pixel(depth, picture.focal_px), whole(picture)
+    if zoom <= all_of_it.zoom:
+        return all_of_it
     return Warp(zoom, (0.5 * float(u.min() + u.max()), 0.5 * float(v.min() + v.max())))
 
 
@@ -108,6 +110,8 @@ def draw_around(
 ) -> Warp:
     """Draw a window that is off by as much as that of a person who is hidden in part may be.
 
+    Whoever is so near that no window is closer than the picture is seen in the picture as it is.
+
     Args:
         picture: The picture.
         person: Indices of the person's pixels in the flat picture, at least one.
@@ -115,6 +119,8 @@ def draw_around(
         roll_deg: Standard deviation of the roll [deg]; half of the windows have none.
     """
     best = around(picture, person)
+    if best.window != (INPUT_WIDTH, INPUT_HEIGHT) or best.zoom == whole(picture).zoom:
+        return best
     zoom = best.zoom * math.exp(rng.normal(0.0, 0.15))
     spot = divmod(int(person[rng.integers(len(person))]), picture.labels.shape[1])[::-1]
     share = rng.uniform(0.0, 0.8) if rng.random() < 0.5 else 0.0
@@ -211,18 +217,4 @@ def _warp(depth, labels, M, swap, window_columns, window_rows, out, out_labels):
                 out_labels[i, j] = unread
                 continue
             out[i, j] = readings[(n - 1) // 2]
-            out_labels[i, j] = _most_frequent(seen, n)
-
-
-@njit(cache=True)
-def _most_frequent(labels, count):
-    """Of equals the middle one, else the first."""
-    best, most = (count - 1) // 2, 0
-    for k in range(-1, count):
-        candidate = best if k < 0 else k
-        votes = 0
-        for m in range(count):
-            votes += labels[m] == labels[candidate]
-        if votes > most:
-            best, most = candidate, votes
-    return labels[best]
+            out_labels[i, j] = most_frequent(seen, n)

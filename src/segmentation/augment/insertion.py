@@ -11,7 +11,7 @@ from jaxtyping import Float, UInt8
 from numba import njit
 from numpy import ndarray
 
-from segmentation.labels import BACKGROUND, person_of
+from segmentation.labels import BACKGROUND, IGNORED, person_of
 from segmentation.picture import Picture
 
 SCALES = (0.6, 1.6)
@@ -114,7 +114,7 @@ def put_behind(
     """Take the person out of a picture and into a room without people.
 
     The room's depth is scaled so that a pixel of it spans as many metres in both pictures, and
-    further about the camera until its furniture hides little of the person.
+    further about the camera until its furniture hides little of the person. Bars stay bars.
 
     Args:
         picture: Whose person to take.
@@ -130,7 +130,7 @@ def put_behind(
     behind_m = room.depth_m * np.float32(picture.focal_px / room.focal_px * rng.uniform(1.0, 1.3))
     for retreat in RETREATS:
         beyond = behind_m * np.float32(retreat)
-        shown = (beyond > 0) & ((depth == 0) | (beyond < depth))
+        shown = (beyond > 0) & ((depth == 0) | (beyond < depth)) & (picture.labels != IGNORED)
         if (shown & person).sum() <= most_hidden * max(1, person.sum()):
             break
     else:
