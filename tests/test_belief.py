@@ -2,9 +2,19 @@
 import numpy as np
 import pytest
 
-from kintrack.belief import coasted, covariance_of, first, predict, spread, updated
-from kintrack.human import prior_sigma
+from kintrack.belief import (
+    angles,
+    coasted,
+    covariance_of,
+    first,
+    guessed_habit,
+    predict,
+    spread,
+    updated,
+)
+from kintrack.human import RESTING_DEG, posed, prior_sigma
 from kintrack.objective_config import MotionConfig, PriorConfig
+from kintrack.residuals.pose_prior import load_leg_prior
 from kintrack.residuals.prior import gaussian_prior
 
 MOTION = MotionConfig()
@@ -38,6 +48,22 @@ def test_a_hidden_hinge_is_less_sure_every_frame_but_never_worse_than_the_prior(
     assert (np.diff(variances) > 0).all()
     assert variances[0] < 0.1 * sigma[knee] ** 2
     assert variances[-1] == pytest.approx(sigma[knee] ** 2, rel=0.01)
+
+
+def test_an_arm_hidden_from_the_first_frame_on_goes_to_rest_and_a_leg_stays(body, scene):
+    q = scene.place({"l_elbow_flexion": 90, "l_knee_flexion": 80, "r_elbow_flexion": 70})
+    resting, legs = posed(body, RESTING_DEG), load_leg_prior(body, PriorConfig())
+    hidden = hinges(body, "l_elbow_flexion", "l_knee_flexion")
+    habit = guessed_habit(q, resting, hidden, legs)
+    elbow, knee, seen = (
+        body.dof(n) for n in ("l_elbow_flexion", "l_knee_flexion", "r_elbow_flexion")
+    )
+    assert habit[elbow] == angles(resting)[elbow] != angles(q)[elbow]
+    assert habit[knee] == angles(q)[knee] and habit[seen] == angles(q)[seen]
+    belief = first(q, 1e-4 * np.eye(body.nv), 0.0, hidden, habit)
+    later = angles(predict(body, belief, 10.0, MOTION))
+    assert later[elbow] == pytest.approx(habit[elbow], abs=1e-2)
+    assert later[knee] == pytest.approx(angles(q)[knee])
 
 
 def test_what_is_seen_says_nothing_about_a_hidden_hinge(body, belief, sigma):

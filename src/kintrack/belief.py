@@ -51,12 +51,50 @@ def covariance_of(H: Float[ndarray, "nv nv"]) -> Float[ndarray, "nv nv"]:
 
 
 def first(
-    q: Float[ndarray, " nq"], covariance: Float[ndarray, "nv nv"], timestamp_s: float
+    q: Float[ndarray, " nq"],
+    covariance: Float[ndarray, "nv nv"],
+    timestamp_s: float,
+    hidden: Bool[ndarray, " nv"] | None = None,
+    habit: Float[ndarray, " nv"] | None = None,
 ) -> Belief:
-    """A belief without history."""
+    """A belief without history.
+
+    Args:
+        q: First pose.
+        covariance: Its covariance.
+        timestamp_s: When [s].
+        hidden: Hinges that are hidden; none if None.
+        habit: Angles to which hidden hinges return [rad]; those of the first pose if None.
+    """
     nv = len(covariance)
-    none = np.zeros(nv, dtype=bool)
-    return Belief(q, np.zeros(nv), covariance, timestamp_s, _angles(q), none)
+    hidden = np.zeros(nv, dtype=bool) if hidden is None else hidden
+    return Belief(
+        q, np.zeros(nv), covariance, timestamp_s, angles(q) if habit is None else habit, hidden
+    )
+
+
+def guessed_habit(
+    q: Float[ndarray, " nq"],
+    resting: Float[ndarray, " nq"],
+    hidden: Bool[ndarray, " nv"],
+    legs: LegPrior,
+) -> Float[ndarray, " nv"]:
+    """What is taken for a habit at first: a first pose says nothing of a hidden arm, so it rests.
+
+    Legs go with the body; those of the first pose are the best guess.
+
+    Args:
+        q: First pose.
+        resting: Posture at rest.
+        hidden: Hinges that are hidden in it.
+        legs: Which hinges are legs'.
+
+    Returns:
+        Hinge angles [rad], 0 for the root.
+    """
+    guessed = hidden.copy()
+    guessed[legs.hinges] = False
+    return np.where(guessed, angles(resting), angles(q))
 
 
 def predict(
@@ -144,7 +182,7 @@ def rest_priors(
     free = hidden.copy()
     free[legs.hinges] = True
     held = diagonal_prior(resting, np.where(free, np.inf, slowly * sigma))
-    return [legs.near(q, np.where(hidden, 1.0, slowly)), held]
+    return [legs.near(q, np.where(hidden, 1.0, slowly), hidden), held]
 
 
 def updated(
@@ -173,7 +211,7 @@ def updated(
     velocity = body.difference(belief.q, q) / dt
     velocity[lost] = motion.damping * belief.velocity[lost]
     learnt = np.where(lost, 0.0, -np.expm1(-dt / motion.habit_s))
-    habit = belief.habit + learnt * (_angles(q) - belief.habit)
+    habit = belief.habit + learnt * (angles(q) - belief.habit)
     return Belief(q, velocity, covariance, timestamp_s, habit, hidden)
 
 
@@ -196,7 +234,7 @@ def coasted(
     )
 
 
-def _angles(q: Float[ndarray, " nq"]) -> Float[ndarray, " nv"]:
+def angles(q: Float[ndarray, " nq"]) -> Float[ndarray, " nv"]:
     """Hinge angles in the order of the tangent space, 0 for the root."""
     return np.concatenate([np.zeros(6), q[7:]])
 

@@ -76,6 +76,8 @@ def agreement(view: View, observation: Observation, explained_m: float) -> Agree
 def distance_between(view: View, observation: Observation, most_m: float) -> float:
     """Mean distance between visible skin and observation, both ways, each capped [m].
 
+    Skin behind something nearer is left out.
+
     Args:
         view: The skin seen by the camera.
         observation: Region that may be the person.
@@ -85,7 +87,8 @@ def distance_between(view: View, observation: Observation, most_m: float) -> flo
         Mean of the two directions' means; the cap where there is nothing to compare.
     """
     points, _ = sample_region(observation, 1500)
-    skin = view.vertices_camera[view.visible]
+    hidden = hidden_vertices(observation, view.vertices_camera, view.visible, view.labels, NEARER_M)
+    skin = view.vertices_camera[view.visible & ~hidden]
     if len(points) == 0 or len(skin) == 0:
         return most_m
     to_skin = np.minimum(cKDTree(skin).query(points)[0], most_m)

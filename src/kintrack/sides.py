@@ -21,6 +21,8 @@ OTHER_SIDE = np.array([0, 1, 2, 4, 3, 6, 5], dtype=np.uint8)
 """`OTHER_SIDE[label]` is the same part of the other side."""
 FIRST_LIMB = 3
 """Labels from this one on have sides."""
+FAR_M2 = 0.3**2
+"""A limb of which the camera would see nothing is taken to be so far from its pixels [m^2]."""
 THIN = 4
 """Every how many vertices of a limb one is looked at."""
 
@@ -79,6 +81,6 @@ def _settle(points, labels, skin, part, margin):
                     own2 = min(own2, d)
                 else:
                     other2 = min(other2, d)
-            if other2 + margin < own2:
+            if other2 + margin < min(own2, FAR_M2):
                 out[i, j] = other
     return out

@@ -19,6 +19,7 @@ from kintrack.belief import (
     coasted,
     covariance_of,
     first,
+    guessed_habit,
     tracking_priors,
     updated,
 )
@@ -235,9 +236,12 @@ class Tracker(Memory):
         self._meet(person)
         place = found.fit.state.joint_positions_world[CHEST]
         self._where = met(self._where, place, frame.timestamp_s)
-        priors = [diagonal_prior(self._resting, self._prior_sigma)]
+        priors, seen = [diagonal_prior(self._resting, self._prior_sigma)], found.observation
         none = np.zeros(person.body.nv, dtype=bool)
-        return self._report(frame, found.observation, found.fit, priors, none, none, began)
+        hidden = hidden_hinges(
+            self._fitted, self._view(found.fit.state, seen), seen, self.config.occlusion
+        )
+        return self._report(frame, seen, found.fit, priors, none, hidden, began)
 
     def _report(
         self,
@@ -260,7 +264,8 @@ class Tracker(Memory):
         covariance = covariance_of(H)
         last, now_s, q = self.belief, frame.timestamp_s, fit.state.q
         if last is None:
-            self.belief = first(q, covariance, now_s)
+            habit = guessed_habit(q, self._resting, hidden, self._legs)
+            self.belief = first(q, covariance, now_s, hidden, habit)
         else:
             self.reading = reading_of(fit, view, agreed, observation)
             self._life = judged(self._life, self.reading, self._lifecycle(observation))

@@ -52,6 +52,16 @@ def test_who_sits_is_held_to_sitting_and_who_stands_to_standing(body, prior, deg
     assert least - 15 < angle(body, target, "r_hip_flexion") < most
 
 
+def test_a_hidden_leg_is_held_as_the_seen_one_says_however_it_was_taken_to_be(body, prior):
+    sitting, standing = posed(body, SITTING_DEG), posed(body, RESTING_DEG)
+    hidden = np.array([False] * 6 + [n.startswith("l_") for n in hinge_names(body)])
+    hidden &= leg_hinges(body)
+    q = np.where(np.r_[False, hidden], standing, sitting)
+    assert angle(body, prior.near(q, hidden=hidden).q0, "l_knee_flexion") > 60
+    nothing = prior.near(q, hidden=leg_hinges(body)).q0
+    assert (nothing == prior.near(q).q0).all()
+
+
 def test_all_but_the_legs_is_free(body, prior):
     q = posed(body, RESTING_DEG)
     moved = body.integrate(q, 0.3 * ~leg_hinges(body))

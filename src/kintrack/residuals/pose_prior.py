@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.linalg import solve_triangular
 
@@ -43,23 +43,36 @@ class LegPrior:
     """s^2 S_k + f^2 I."""
 
     def near(
-        self, q: Float[ndarray, " nq"], doubt: Float[ndarray, " nv"] | None = None
+        self,
+        q: Float[ndarray, " nq"],
+        doubt: Float[ndarray, " nv"] | None = None,
+        hidden: Bool[ndarray, " nv"] | None = None,
     ) -> TangentPrior:
         """The likeliest component at a configuration, as a term.
+
+        Where a leg is hidden, what is seen of both chooses: how a hidden leg was taken to be is no
+        evidence of how it is.
 
         Args:
             q: Where the body is expected.
             doubt: Factor on the deviation of every velocity component; 1 if None.
+            hidden: Velocity components that are hidden; none if None.
 
         Returns:
             The term; all but the legs is free.
         """
         places = self.hinges + 1
-        off = (q[places] - self.means_rad)[..., None]  # (K, N, 1)
+        seen = np.ones(len(places), dtype=bool) if hidden is None else ~hidden[self.hinges]
+        if not seen.any():
+            seen[:] = True
+        whitening = self._whitening
+        if not seen.all():
+            whitening = _whitening_of(self.covariances_rad2[:, seen][:, :, seen])
+        off = (q[places] - self.means_rad)[:, seen, None]  # (K, N, 1)
         # the root's inverse G of a covariance: log p = log w + log |G| - |G (q - mu)|^2 / 2
-        whitened = (self._whitening @ off)[..., 0]
+        whitened = (whitening @ off)[..., 0]
         likely = np.log(self.weights) - 0.5 * (whitened**2).sum(axis=1)
-        likely += np.log(np.diagonal(self._whitening, axis1=1, axis2=2)).sum(axis=1)
+        likely += np.log(np.diagonal(whitening, axis1=1, axis2=2)).sum(axis=1)
         best = int(likely.argmax())
         q0 = q.copy()
         q0[places] = self.means_rad[best]
@@ -71,9 +84,13 @@ class LegPrior:
     @cached_property
     def _whitening(self) -> Float[ndarray, "k n n"]:
         """Inverses of the covariances' lower Cholesky factors."""
-        factors = np.linalg.cholesky(self.covariances_rad2)
-        eye = np.eye(factors.shape[1])
-        return np.stack([solve_triangular(factor, eye, lower=True) for factor in factors])
+        return _whitening_of(self.covariances_rad2)
+
+
+def _whitening_of(covariances: Float[ndarray, "k n n"]) -> Float[ndarray, "k n n"]:
+    factors = np.linalg.cholesky(covariances)
+    eye = np.eye(factors.shape[1])
+    return np.stack([solve_triangular(factor, eye, lower=True) for factor in factors])
 
 
 def load_leg_prior(body: Body, config: PriorConfig, folder: Path | None = None) -> LegPrior:
