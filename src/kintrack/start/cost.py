@@ -7,6 +7,7 @@ The mismatch is an area integral over observation and skin, divided by the obser
 
 d_i from observed point i, of area w_i, to the nearest skin of its part that faces the camera. A
 point of a limb may take the limb of the other side at the price s^2, since networks mistake sides.
+Once a body is fitted, a point may take any part at the price p^2, as while tracking.
 f_v is how far skin vertex v, of area a, sticks out into space that is seen to be free, or stands in
 front of what is seen. Skin behind something nearer costs nothing.
 """
@@ -48,6 +49,7 @@ def place(
     for k in range(6):
         owner[ends[k] : ends[k + 1]] = k
     trunk = weights[: ends[2]].sum() > 0.02
+    caps2 = np.full(len(points), CAP_M * CAP_M)
     first = np.isnan(t[0])
     if first:
         t[:] = _roughly(points, weights, ends, skins, eye, trunk)
@@ -67,7 +69,8 @@ def place(
                 for p in range(v.shape[0]):
                     cost = _part_cost(
                         points, weights, owner, low, high, v[p], n[p], t, eye, R, shift,
-                        intrinsics, depth, away, labels, has_background, k, each[k], side2, best,
+                        intrinsics, depth, away, labels, has_background, k, each[k], side2, caps2,
+                        best,
                     ) + _unrest(weights, owner, low, high, k, p, rest[k])  # fmt: skip
                     if cost < best:
                         best = cost
@@ -78,7 +81,7 @@ def place(
     choice[:] = chosen[2:]
     cost = mismatch(
         points, weights, ends, owner, skins, normals, chosen, t, eye, R, shift,
-        intrinsics, depth, away, labels, has_background, each, side2,
+        intrinsics, depth, away, labels, has_background, each, side2, np.inf,
     )  # fmt: skip
     unrest = 0.0
     for k in range(2, 6):
@@ -90,18 +93,26 @@ def place(
 @njit(cache=True, nogil=True)
 def mismatch(
     points, weights, ends, owner, skins, normals, chosen, t, eye, R, shift,
-    intrinsics, depth, away, labels, has_background, each, side2,
+    intrinsics, depth, away, labels, has_background, each, side2, part2,
 ):  # fmt: skip
-    """The module's equation for chosen postures [m^2]; takes sides first."""
+    """The module's equation for chosen postures [m^2]; takes sides first. `part2` is p^2."""
     if side2 < 1.0:
         _take_sides(points, ends, owner, skins, normals, chosen, t, eye, side2)
     cost = 0.0
+    caps2 = np.full(len(points), CAP_M * CAP_M)
+    if part2 < CAP_M * CAP_M:
+        k = 0
+        for v, n in zip(skins, normals):  # noqa: B905
+            for i in range(len(points)):
+                j, d2 = _nearest(points[i], v[chosen[k]], n[chosen[k]], t, eye)
+                caps2[i] = min(caps2[i], d2 + part2)
+            k += 1
     k = 0
     for v, n in zip(skins, normals):  # noqa: B905
         low, high = _range(ends, k)
         cost += _part_cost(
             points, weights, owner, low, high, v[chosen[k]], n[chosen[k]], t, eye, R, shift,
-            intrinsics, depth, away, labels, has_background, k, each[k], side2, np.inf,
+            intrinsics, depth, away, labels, has_background, k, each[k], side2, caps2, np.inf,
         )  # fmt: skip
         for i in range(ends[k], ends[k + 1]):
             if owner[i] != k:
@@ -225,7 +236,7 @@ def _nearest(x, v, n, t, eye):
 @njit(cache=True, nogil=True)
 def _part_cost(
     points, weights, owner, low, high, v, n, t, eye, R, shift,
-    intrinsics, depth, away, labels, has_background, k, each, side2, most,
+    intrinsics, depth, away, labels, has_background, k, each, side2, caps2, most,
 ):  # fmt: skip
     """Numerator of the module's equation for part k in one posture [m^4]; stops above `most`."""
     h, w = depth.shape
@@ -259,7 +270,7 @@ def _part_cost(
     for i in range(low, high):
         if owner[i] == k:
             j, d2 = _nearest(points[i], v, n, t, eye)
-            cost += weights[i] * min(d2, CAP_M * CAP_M)
+            cost += weights[i] * min(d2, caps2[i])
             if cost > most:
                 break
     return cost

@@ -89,7 +89,8 @@ def start_at(
         except AssociationError:
             return None
         view = view_skin(human, fit.state, T_camera_world, seen, config)
-        return view_mismatch(view, evidence, start.side_m), fit, view
+        part_m = config.association.part_m
+        return view_mismatch(view, evidence, start.side_m, part_m), fit, view
 
     best, least = None, np.inf
     for guess in tries:
@@ -102,5 +103,5 @@ def start_at(
     if closer is not None and closer[0] < best[0]:
         best = closer
     cost, fit, view = best
-    agreed = agreement(view, settled(view), config.judge.explained_m)
-    return Start(fit, agreed, seen, cost)
+    own = settled(view)
+    return Start(fit, agreement(view, own, config.judge.explained_m), own, cost)

@@ -22,6 +22,8 @@ from kintrack.start.postures import STRIDE, TORSO_STRIDE, Postures, root_rotatio
 
 SKIN_M2 = 1.8
 """An adult's skin [m^2]."""
+WEAK_M2 = 0.03
+"""A limb that shows less than this may be anywhere: its posture is a guess [m^2]."""
 VIEW_STRIDE = 2
 """Every how many vertices of a part one is looked at once the body is fitted."""
 
@@ -60,7 +62,8 @@ def guesses(
         kept: So many of the best tries get a second choice of limbs.
 
     Returns:
-        The `kept` best guesses, the best first; none without a point.
+        The `kept` best guesses, the best first, each followed by one whose hardly seen limbs rest,
+        if that is another one; none without a point.
     """
     if len(evidence.points_world) == 0:
         return []
@@ -102,22 +105,37 @@ def guesses(
     ]
     best = sorted(tries, key=lambda one: one.cost)[:kept]
     again = [attempt(one.trunk, one.yaw_rad, one.t, one.choice, 2) for one in best]
+    areas = np.add.reduceat(np.r_[evidence.weights_m2, 0.0], evidence.ends[2:6])
+    areas[evidence.ends[2:6] == evidence.ends[3:7]] = 0.0
     found = []
     for one in sorted(again, key=lambda one: one.cost):
         R = root_rotation(one.yaw_rad, postures.pitches_rad[one.trunk])
-        q = postures.configuration(one.trunk, one.choice)
-        q[:3], q[3:7] = R @ one.t, pin.Quaternion(R).coeffs()
-        found.append(Guess(one.cost - one.unrest, q, one.unrest))
+        for choice in (one.choice, _rested(one.choice, areas)):
+            q = postures.configuration(one.trunk, choice)
+            q[:3], q[3:7] = R @ one.t, pin.Quaternion(R).coeffs()
+            found.append(Guess(one.cost - one.unrest, q, one.unrest))
+            if (_rested(choice, areas) == choice).all():
+                break
     return found
 
 
-def view_mismatch(view: View, evidence: Evidence, side_m: float) -> float:
+def _rested(choice: Int[ndarray, " 4"], areas_m2: Float[ndarray, " 4"]) -> Int[ndarray, " 4"]:
+    """The choice with hardly seen arms at rest, and a hardly seen leg as the other one is."""
+    weak, out = areas_m2 < WEAK_M2, choice.copy()
+    out[:2][weak[:2]] = 0
+    if weak[2:].any():
+        out[2:] = out[2 + int(areas_m2[3] > areas_m2[2])]
+    return out
+
+
+def view_mismatch(view: View, evidence: Evidence, side_m: float, part_m: float) -> float:
     """Mismatch of posed skin with a person, see `kintrack.start.cost` [m^2].
 
     Args:
         view: The skin seen by the camera.
         evidence: Of the person.
         side_m: How far a limb's side is believed [m].
+        part_m: How far a part is believed [m].
     """
     visible = [
         np.ascontiguousarray(
@@ -147,5 +165,6 @@ def view_mismatch(view: View, evidence: Evidence, side_m: float) -> float:
             evidence.has_background,
             np.full(6, VIEW_STRIDE * SKIN_M2 / len(view.labels)),
             side_m**2,
+            part_m**2,
         )
     )
