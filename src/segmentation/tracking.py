@@ -13,9 +13,8 @@ from numpy import ndarray
 from kintrack.segmenter import Region
 from kintrack.sequence.frame import Frame
 from segmentation.errors import InputError
-from segmentation.evaluate import true_labels
 from segmentation.labels import BACKGROUND, IGNORED
-from segmentation.preprocess import Letterbox, letterbox, network_input
+from segmentation.preprocess import letterbox, network_input
 from segmentation.region import Window, cells_per_pixel, region_of_person, window
 from segmentation.runtime import NetworkSegmenter, RuntimeConfig, guesses_of, load_segmenter
 from segmentation.weights import SHIPPED
@@ -111,7 +110,7 @@ class ImageSegmenter:
 
 @dataclass(frozen=True)
 class TrueSegmenter:
-    """The labels that came with the recording, at the network's size: the ceiling of any network.
+    """The labels that came with the recording, as fine as a network's come: the ceiling of any.
 
     A frame without labels shows nobody.
     """
@@ -120,17 +119,13 @@ class TrueSegmenter:
     """As it stands in a result's summary."""
 
     def segment(self, frame: Frame, region: Region | None = None) -> UInt8[ndarray, "r c"]:
-        """True labels of the cells that lie in the image, wherever a region is."""
-        fit = letterbox(frame.camera.width, frame.camera.height)
-        if frame.labels is None:
-            return np.zeros((fit.rows, fit.columns), dtype=np.uint8)
-        labels = inside_bars(true_labels(frame), fit)
+        """True labels of every n-th pixel, wherever a region is; what is unknown is background."""
+        labels = frame.labels
+        if labels is None:
+            labels = np.zeros((frame.camera.height, frame.camera.width), dtype=np.uint8)
+        step = thinning(labels.shape[1])
+        labels = labels[::step, ::step]
         return np.where(labels == IGNORED, np.uint8(BACKGROUND), labels)
-
-
-def inside_bars(labels: UInt8[ndarray, "106 128"], fit: Letterbox) -> UInt8[ndarray, "r c"]:
-    """The part of the network's picture that the image fills."""
-    return labels[fit.top : fit.top + fit.rows, fit.left : fit.left + fit.columns]
 
 
 def _closer(region: Region | None, frame: Frame) -> Window | None:

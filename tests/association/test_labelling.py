@@ -16,6 +16,14 @@ def test_a_map_finer_than_the_image_is_sampled():
     assert np.array_equal(labels_of_pixels(labels, np.ones((4, 6))), labels[::4, 2::4])
 
 
+def test_of_a_map_of_the_whole_image_a_thinned_image_takes_its_own_pixels():
+    rng = np.random.default_rng(0)
+    labels = rng.integers(0, 7, (424, 513)).astype(np.uint8)
+    for step in (2, 3):
+        depth = np.ones((424, 513))[::step, ::step]
+        assert (labels_of_pixels(labels, depth) == labels[::step, ::step]).all()
+
+
 def test_a_pixel_without_reading_is_background():
     depth = np.ones((4, 4))
     depth[1, 2] = 0.0

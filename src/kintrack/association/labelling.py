@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
 from kintrack.components import components
@@ -23,15 +23,22 @@ def labels_of_pixels(
 
     Args:
         labels: Label map that covers the whole image, shape (R, C).
-        depth_m: Depth of every pixel [m], 0 = no reading, shape (H, W).
+        depth_m: Depth of every pixel, or of every n-th of the map's [m], 0 = no reading, shape
+            (H, W).
 
     Returns:
         Labels, shape (H, W); 0 where there is no reading.
     """
-    h, w = depth_m.shape
-    rows = (2 * np.arange(h) + 1) * labels.shape[0] // (2 * h)
-    columns = (2 * np.arange(w) + 1) * labels.shape[1] // (2 * w)
+    rows, columns = (_cells(n, cells) for n, cells in zip(depth_m.shape, labels.shape, strict=True))
     return np.where(depth_m > 0, labels[rows].take(columns, axis=1), np.uint8(0))
+
+
+def _cells(n: int, cells: int) -> Int[ndarray, " n"]:
+    """The cell of each pixel along one axis; of every k-th pixel of the map if it is finer."""
+    step = round(cells / n)
+    if step > 1 and -(-cells // step) == n:
+        return step * np.arange(n)
+    return (2 * np.arange(n) + 1) * cells // (2 * n)
 
 
 def spread_labels(
