@@ -23,7 +23,7 @@ from segmentation.errors import SegmentationError, WeightsError
 from segmentation.labels import LABELS
 from segmentation.preprocess import SPECIFICATION
 
-SHIPPED = Path(__file__).parent / "pretrained" / "fast_fcn.safetensors"
+SHIPPED = Path(__file__).parent / "pretrained" / "unet_small.safetensors"
 """The weights that come with kintrack."""
 ENTRY = "kintrack.segmentation"
 """The file's only metadata entry, in JSON: several would come in a random order."""
