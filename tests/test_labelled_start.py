@@ -13,7 +13,7 @@ from kintrack.labelled_config import LabelledStartConfig
 from kintrack.sides import OTHER_SIDE
 from kintrack.start import start_from_labels
 from kintrack.start.evidence import evidence_of
-from kintrack.start.placing import guesses
+from kintrack.start.placing import WEAK_M2, guesses, rested
 from kintrack.start.postures import ARMS_DEG, LEGS_DEG, TRUNKS_DEG, postures_of
 from labelled_people import board, labelled, world_joints
 
@@ -85,6 +85,29 @@ def test_a_leg_that_is_overlooked_is_guessed_as_the_other_one(scene):
         best = guesses(postures, evidence_of(seen, T), 12, 0.05, vertices, 12)[0]
         away = np.linalg.norm(world_joints(scene, best.q) - world_joints(scene, q), axis=1)
         assert away[[n for n in LEGS if JOINT_NAMES[n].startswith("l_")]].mean() < 0.2
+
+
+def test_a_hardly_seen_limb_is_also_tried_at_rest():
+    choice = np.array([3, 7, 2, 9])
+    seen, hardly = 2 * WEAK_M2, 0.5 * WEAK_M2
+    assert (rested(choice, np.full(4, seen)) == choice).all()
+    assert rested(choice, np.array([hardly, seen, seen, seen])).tolist() == [0, 7, 2, 9]
+    assert rested(choice, np.array([seen, seen, seen, hardly])).tolist() == [3, 7, 2, 2]
+    assert rested(choice, np.array([seen, seen, 0.0, hardly])).tolist() == [3, 7, 9, 9]
+
+
+def test_guesses_with_an_arm_of_few_pixels_come_with_one_whose_arm_rests(scene):
+    q = scene.place(ARMS_OUT_DEG, at=(2.9, 0.0, 0.0))
+    observation = labelled(scene, q)
+    arm = np.argwhere(observation.labels == 3)
+    labels = observation.labels.copy()
+    labels[tuple(arm[12:].T)] = 0
+    few = evidence_of(replace(observation, labels=labels, region=labels > 0), T)
+    tries = guesses(postures_of(scene.human), few, 12, 0.1, len(scene.human.skin.labels), 4)
+    right = postures_of(scene.human).arms[:4]
+    resting = postures_of(scene.human).configuration(0, np.zeros(4, int))[right]
+    assert len(tries) > 4
+    assert any(np.allclose(one.q[right], resting) for one in tries)
 
 
 def test_nobody_is_found_where_nobody_is_labelled(scene):

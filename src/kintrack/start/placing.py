@@ -110,16 +110,16 @@ def guesses(
     found = []
     for one in sorted(again, key=lambda one: one.cost):
         R = root_rotation(one.yaw_rad, postures.pitches_rad[one.trunk])
-        for choice in (one.choice, _rested(one.choice, areas)):
+        for choice in (one.choice, rested(one.choice, areas)):
             q = postures.configuration(one.trunk, choice)
             q[:3], q[3:7] = R @ one.t, pin.Quaternion(R).coeffs()
             found.append(Guess(one.cost - one.unrest, q, one.unrest))
-            if (_rested(choice, areas) == choice).all():
+            if (rested(choice, areas) == choice).all():
                 break
     return found
 
 
-def _rested(choice: Int[ndarray, " 4"], areas_m2: Float[ndarray, " 4"]) -> Int[ndarray, " 4"]:
+def rested(choice: Int[ndarray, " 4"], areas_m2: Float[ndarray, " 4"]) -> Int[ndarray, " 4"]:
     """The choice with hardly seen arms at rest, and a hardly seen leg as the other one is."""
     weak, out = areas_m2 < WEAK_M2, choice.copy()
     out[:2][weak[:2]] = 0
