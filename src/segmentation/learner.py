@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import os
 from collections.abc import Mapping
@@ -98,6 +99,11 @@ class Learner:
             from torch.nn.parallel import DistributedDataParallel
 
             self._forward = DistributedDataParallel(self.network)
+
+    def part(self) -> None:
+        """Let go of the other processes, so that the threads that talk to them end in order."""
+        self._forward = self.network
+        gc.collect()
 
     def unfold(self, images: Float[ndarray, "b 4 106 128"]) -> None:
         """Let the normalisation of weights to begin with change nothing, see `networks.unfold`."""

@@ -119,6 +119,7 @@ def train(
         draw_curves(read_log(output / LOG_FILE), output / CURVES_FILE)
     group.agree(0.0)
     if group.world > 1:
+        learner.part()
         torch.distributed.destroy_process_group()
     return path
 
