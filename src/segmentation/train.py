@@ -29,7 +29,6 @@ from segmentation.calibrate import calibrated
 from segmentation.curves import CURVES_FILE, LOG_FILE, append_log, draw_curves, read_log
 from segmentation.dataset import Batches, Pictures, Split
 from segmentation.evaluate import N, Scores, scores_of
-from segmentation.heap import keep_memory
 from segmentation.learner import Group, Learner, check_finite, join_group
 from segmentation.networks import folded
 from segmentation.prepared import Prepared, PreparedBatches
@@ -93,8 +92,6 @@ def train(
         KeyboardInterrupt: after Ctrl-C, once a checkpoint is written.
     """
     group = join_group(config)
-    if group.device.type == "cpu":
-        keep_memory()
     learner = Learner(config, group, start)
     if start is not None and config.normalised:
         learner.unfold(Batches(data.train, config.augment, bank, UNFOLDED, config.seed)[0][0])

@@ -125,8 +125,8 @@ hides a third of the person; its farthest point lies 30, 45 or 60 cm before her 
 {_grid(tables.parts(content))}
 
 A tracker uses labels of the depth image's pixels, every other one of 512 x 424. At the network's size
-a second look is judged by the most frequent of the four such labels in a cell, the background where
-they tie, and its own cells lie askew to those: parts a few cells wide lose by that. At the pixels:
+a second look is judged by the label in the middle of a cell, and its own cells lie askew to those:
+parts a few cells wide lose by that. At the pixels:
 
 {_grid(tables.of_pixels(content))}
 

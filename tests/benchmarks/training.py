@@ -35,7 +35,7 @@ PAPER_FRAMES, PAPER_PARTS = 120, ("paper/train", "paper/objects")
 FULL_FRAMES, QUICK_FRAMES = 19_000, 60
 """Of the recipe `training`: 1,900 recordings, half an hour on two cores."""
 STEPS = {"ship": 7_500, "compare": 20_000}
-"""Usual length of each training; `ship` takes 1.4 h on two cores."""
+"""Usual length of each training; `ship` takes 1.6 h on two cores."""
 BANK = ("--bank.cutouts", "3000", "--bank.rooms", "600")
 """Things and rooms to put into pictures, as many as for what ships."""
 WIDTHS = {

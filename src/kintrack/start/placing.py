@@ -63,7 +63,7 @@ def guesses(
 
     Returns:
         The `kept` best guesses, the best first, each followed by one whose hardly seen limbs rest,
-        if that is another one; none without a point.
+        if that is another one, at the price of the first; none without a point.
     """
     if len(evidence.points_world) == 0:
         return []
@@ -110,12 +110,11 @@ def guesses(
     found = []
     for one in sorted(again, key=lambda one: one.cost):
         R = root_rotation(one.yaw_rad, postures.pitches_rad[one.trunk])
-        for choice in (one.choice, rested(one.choice, areas)):
+        choices = [one.choice, rested(one.choice, areas)]
+        for choice in choices if (choices[0] != choices[1]).any() else choices[:1]:
             q = postures.configuration(one.trunk, choice)
             q[:3], q[3:7] = R @ one.t, pin.Quaternion(R).coeffs()
             found.append(Guess(one.cost - one.unrest, q, one.unrest))
-            if (rested(choice, areas) == choice).all():
-                break
     return found
 
 

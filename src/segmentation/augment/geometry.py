@@ -119,7 +119,7 @@ def draw_around(
         roll_deg: Standard deviation of the roll [deg]; half of the windows have none.
     """
     best = around(picture, person)
-    if best.window != (INPUT_WIDTH, INPUT_HEIGHT) or best.zoom == whole(picture).zoom:
+    if best == whole(picture):
         return best
     zoom = best.zoom * math.exp(rng.normal(0.0, 0.15))
     spot = divmod(int(person[rng.integers(len(person))]), picture.labels.shape[1])[::-1]
