@@ -22,7 +22,7 @@ OTHER_SIDE = np.array([0, 1, 2, 4, 3, 6, 5], dtype=np.uint8)
 FIRST_LIMB = 3
 """Labels from this one on have sides."""
 FAR_M2 = 0.3**2
-"""Own skin counts as no further from a pixel than this, also where the camera would see none [m^2]."""
+"""Own skin counts as no further from a pixel than this, also where none would be seen [m^2]."""
 THIN = 4
 """Every how many vertices of a limb one is looked at."""
 
