@@ -19,6 +19,7 @@ from synthesis.render.stage import Stage
 from synthesis.render.view import View, pixel_radiance
 from synthesis.scene import Scene
 from synthesis.sensors.sensor import rays
+from synthesis.sensors.shown import labels_shown
 
 SHARE_STEP = 4
 """Every how many pixels the hidden share is measured."""
@@ -35,7 +36,7 @@ class Exposure:
     true_depth_m: Float[ndarray, "h w"]
     """Depth without noise [m], 0 = nothing there."""
     labels: UInt8[ndarray, "h w"]
-    """True part labels."""
+    """True part labels of what the readings show; of the rays where there is none."""
     color: UInt8[ndarray, "h w 3"] | None
     """Colour registered to depth, R G B; None if the scene has no colour camera."""
     joint_positions_camera_m: Float[ndarray, "j 3"]
@@ -70,11 +71,12 @@ def film(scene: Scene, rng: np.random.Generator) -> Iterator[Exposure]:
         view = stage.view(vertices, samples, T, color=scene.color is not None)
         joints = transform_points(invert_rigid(T), state.joint_positions_world)
         faces = scene.figure.mesh.faces
+        depth = scene.sensor.measure(view, rng)
         yield Exposure(
             timestamp_s=n / RATE_HZ,
-            depth_m=scene.sensor.measure(view, rng),
+            depth_m=depth,
             true_depth_m=view.depth_m[::k, ::k],
-            labels=view.labels[::k, ::k],
+            labels=labels_shown(view, depth),
             color=None
             if scene.color is None
             else scene.color.develop(pixel_radiance(view, k), rng),

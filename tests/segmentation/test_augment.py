@@ -11,7 +11,7 @@ from segmentation.augment.bank import BankConfig, load_bank
 from segmentation.augment.color import recolored
 from segmentation.augment.geometry import Warp, around, draw_around, draw_warp, warped, whole
 from segmentation.augment.insertion import insert, person_of, put_behind, without_background
-from segmentation.augment.noise import MOST_ABSORBED, SensorFaults, absorbed, spoilt
+from segmentation.augment.noise import SensorFaults, spoilt
 from segmentation.augment.sample import AugmentConfig, Bank, augmented, changed, plain_sample
 from segmentation.labels import IGNORED, MIRRORED
 from segmentation.picture import Picture, reduced
@@ -216,18 +216,6 @@ def test_quantised_depth_takes_few_values():
     depth = np.linspace(2.9, 3.1, 106 * 128, dtype=np.float32).reshape(106, 128)
     out = spoilt(depth, NO_FAULTS._replace(step=0.003), np.random.default_rng(0))
     assert np.abs(out - depth).max() < 0.02 and (np.diff(out.reshape(-1)) == 0).mean() > 0.1
-
-
-def test_dark_surfaces_lose_their_depth_and_bright_ones_keep_it():
-    depth = np.full((106, 128), 3.0, np.float32)
-    color = np.full((106, 128, 3), 230, np.uint8)
-    color[:32] = 10
-    lost = np.stack([absorbed(depth, color, np.random.default_rng(n)) == 0 for n in range(20)])
-    shares = lost.mean(axis=(1, 2))
-    assert shares.max() < MOST_ABSORBED + 0.01 and shares.max() > 0.5 * MOST_ABSORBED
-    assert not lost[:, 40:].any() and lost[:, :28].any()
-    nothing = np.zeros_like(depth)
-    assert not absorbed(nothing, color, np.random.default_rng(0)).any()
 
 
 def test_lost_readings_are_background():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What else a depth sensor does wrong: noise, steps, lost edges, specks, patches, dark surfaces.
+"""What else a depth sensor does wrong: noise, steps, lost edges, specks, patches.
 
 Sizes span what is published of Kinect v1 (sigma 1.4 mm and steps 2.8 mm at 1 m, both growing with
 the square of the depth: Khoshelham & Elberink 2012) and of time of flight (Fankhauser et al. 2015).
@@ -12,17 +12,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float
 from numba import njit
 from numpy import ndarray
-
-from segmentation.augment.color import GREY
-
-MOST_ABSORBED = 0.3
-"""Greatest share of an image's readings that its dark surfaces swallow."""
-LUMA_GRAIN, LUMA_BLUR_PX = 20.0, 1.0
-"""Standard deviation of what decides besides brightness [grey levels], and over how far the sensor
-takes the mean of both [px]."""
 
 
 class SensorFaults(NamedTuple):
@@ -87,27 +79,6 @@ def spoilt(
     _spoil(depth_m, normal, uniform, lost, faults.noise, faults.step, faults.edge, faults.flying,
            faults.specks, faults.farthest_m, out)  # fmt: skip
     return out
-
-
-def absorbed(
-    depth_m: Float[ndarray, "h w"], color: UInt8[ndarray, "h w 3"], rng: np.random.Generator
-) -> Float[ndarray, "h w"]:
-    """The depth image without its darkest surfaces: leather, hair and trousers swallow the light.
-
-    Which share of the readings goes is drawn up to `MOST_ABSORBED`; cloth of one colour frays.
-
-    Args:
-        depth_m: Depth [m], float32, 0 = no reading.
-        color: R G B of the same pixels.
-        rng: Draws how much, and the fraying.
-    """
-    share = MOST_ABSORBED * rng.random()
-    grain = rng.normal(0.0, LUMA_GRAIN, depth_m.shape)
-    luma = cv2.GaussianBlur(color @ GREY + grain, (0, 0), LUMA_BLUR_PX)
-    read = depth_m > 0
-    if not read.any():
-        return depth_m
-    return np.where(luma < np.quantile(luma[read], share), np.float32(0.0), depth_m)
 
 
 @njit(cache=True)

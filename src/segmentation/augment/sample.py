@@ -11,10 +11,11 @@ from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from kintrack.bounds import check_bounds
+from segmentation.augment.absorption import absorbed
 from segmentation.augment.color import recolored
 from segmentation.augment.geometry import Warp, around, cut, draw_around, draw_warp, warped, whole
 from segmentation.augment.insertion import Cutouts, insert, put_behind, without_background
-from segmentation.augment.noise import absorbed, draw_faults, spoilt
+from segmentation.augment.noise import draw_faults, spoilt
 from segmentation.errors import SegmentationError
 from segmentation.labels import BACKGROUND, IGNORED, person_of
 from segmentation.picture import Picture
@@ -62,8 +63,8 @@ class AugmentConfig:
     """Chance that colours change."""
     spoilt: float = 0.8
     """Chance of further sensor noise."""
-    absorbed: float = 0.15
-    """Chance that what is dark returns no depth, where there is colour."""
+    absorbed: float = 0.3
+    """Chance that dark surfaces return no depth."""
     focal_spread: float = 0.02
     """Standard deviation of the relative error of the focal length."""
 
@@ -140,9 +141,9 @@ def changed(
     if rng.random() < config.inserted:
         for _ in range(1 + int(rng.integers(0, MOST_INSERTED))):
             view = insert(view, bank.cutouts, config.most_hidden * rng.uniform(0.3, 1.0), rng)
+    if rng.random() < config.absorbed:
+        view = absorbed(view, rng)
     color, depth = view.color, view.depth_m
-    if color is not None and config.absorbed and rng.random() < config.absorbed:
-        depth = absorbed(depth, color, rng)
     if chance["color"] < config.depth_only:
         color = None
     if color is not None and chance["tint"] < config.recolored:
