@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from training_data import CAMERA, PAINT, figure, picture, squares
 
+from segmentation.augment import insertion
 from segmentation.augment.bank import BankConfig, load_bank
 from segmentation.augment.color import recolored
 from segmentation.augment.geometry import Warp, around, draw_around, draw_warp, warped, whole
@@ -135,6 +136,25 @@ def test_an_inserted_thing_hides_only_what_is_farther_and_is_background(seed):
     assert (after.color[~new] == before.color[~new]).all()
     hidden = (person_of(before.labels) & new).sum() / person_of(before.labels).sum()
     assert hidden <= 0.5
+
+
+def test_what_she_holds_touches_her_and_is_no_larger_than_what_people_hold(monkeypatch):
+    monkeypatch.setattr(insertion, "BEFORE", 0.0)
+    monkeypatch.setattr(insertion, "HELD", 1.0)
+    before = warped(picture(0), whole(picture(0)))
+    person = person_of(before.labels)
+    shown, gaps_m = 0, []
+    for seed in range(40):
+        after = insert(before, squares(), 0.5, np.random.default_rng(seed))
+        new = after.depth_m != before.depth_m
+        if not (new & person).any():
+            continue
+        shown += 1
+        gaps_m.append((before.depth_m - after.depth_m)[new & person].min())
+        rows, columns = np.nonzero(new)
+        side_m = max(np.ptp(rows), np.ptp(columns)) * after.depth_m[new].min() / before.focal_px
+        assert side_m < 1.6 * insertion.HELD_SIDE_M[1]
+    assert shown > 15 and max(gaps_m) < 0.1
 
 
 def test_most_tries_insert_something_and_some_of_it_hides_the_person():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""RGB-D cut-outs put before and beside the person, and rooms put behind her, by depth [Wan19]."""
+"""RGB-D cut-outs put before, beside and onto the person, and rooms behind her, by depth [Wan19]."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ SCALES = (0.6, 1.6)
 """How much larger than life a cut-out may be."""
 STRETCH = 0.2
 """Standard deviation of the logarithm of its width over its height, which were 1."""
-BEFORE = 0.75
-"""Share of the cut-outs that stand before the person; the others anywhere about her depth."""
+BEFORE, HELD = 0.5, 0.25
+"""Share of the cut-outs that stand before the person, and of those that touch her as if she held
+them or had them in her lap; the others are anywhere about her depth."""
+HELD_SIDE_M, HELD_GAP_M = (0.15, 0.9), (-0.05, 0.05)
+"""Side of a cut-out that she holds, and from its far side to her surface there [m]."""
 GAP_M = (0.02, 0.9)
 """From a cut-out's far side to the person's near side [m]."""
 NEAREST_M = 0.4
@@ -55,7 +58,8 @@ def insert(
     """Put one cut-out into a picture, before or beside the person, or anywhere if there is nobody.
 
     Scale, turn, place and depth are drawn; whatever is farther than the cut-out is replaced and
-    becomes background. Of some places before the person, one that hides much of her is taken.
+    becomes background. Of some places before the person, one that hides much of her is taken. If
+    there is nobody, some other reading takes her place.
 
     Args:
         picture: Where to put it; not changed.
@@ -76,17 +80,24 @@ def insert(
     near_m, far_m = float(depths[len(depths) // 20]), float(depths[-1 - len(depths) // 20])
     which = int(rng.integers(len(cutouts)))
     relief, color = cutouts.relief_m[which], cutouts.color[which]
-    before = bool(rng.random() < BEFORE)
+    kind = rng.random()
+    before, held = kind < BEFORE, BEFORE <= kind < BEFORE + HELD
     best, most = picture, -1
     for _ in range(PLACES):
         scale = math.exp(rng.uniform(math.log(SCALES[0]), math.log(SCALES[1])))
+        row, column = divmod(int(person[rng.integers(len(person))]), picture.depth_m.shape[1])
+        spread = SPREAD * math.sqrt(len(person))
         if before:
             middle_m = near_m - rng.uniform(*GAP_M) - scale * float(np.nanmax(relief))
+        elif held:
+            side_m = len(relief) * float(cutouts.meters_per_px[which])
+            scale, spread = rng.uniform(*HELD_SIDE_M) / side_m, 0.0
+            middle_m = float(picture.depth_m[row, column]) - scale * float(np.nanmax(relief))
+            middle_m -= rng.uniform(*HELD_GAP_M)
         else:
             middle_m = rng.uniform(near_m - 0.3, far_m + 0.8)
         turn = rng.uniform(-math.pi, math.pi) if rng.random() < 0.15 else rng.normal(0.0, 0.12)
-        row, column = divmod(int(person[rng.integers(len(person))]), picture.depth_m.shape[1])
-        center = [column, row] + rng.normal(0.0, SPREAD * math.sqrt(len(person)), 2)
+        center = [column, row] + rng.normal(0.0, spread, 2)
         flip = math.exp(rng.normal(0.0, STRETCH)) * (-1.0 if rng.random() < 0.5 else 1.0)
         noise_m = rng.uniform(0.0, 0.002) * middle_m**2
         seed = np.uint64(rng.integers(1 << 62))
