@@ -13,8 +13,9 @@ from numpy import ndarray
 
 from kintrack.errors import DatasetError
 from kintrack.sequence.frame import Frame
-from segmentation.labels import BACKGROUND, IGNORED, LABELS
-from segmentation.preprocess import HOLE, labels_to_network, network_input
+from segmentation.labels import BACKGROUND, IGNORED, INPUT_HEIGHT, INPUT_WIDTH, LABELS
+from segmentation.picture import cells_of, checked
+from segmentation.preprocess import letterbox
 from segmentation.runtime import Segmenter
 
 N = len(LABELS)
@@ -87,17 +88,21 @@ def scores_of(counts: Int[ndarray, "7 7"]) -> Scores:
 
 
 def true_labels(frame: Frame) -> UInt8[ndarray, "106 128"]:
-    """The truth at the network's size; a cell without reading is background.
+    """The truth at the network's size: what the readings of a cell show, see `picture.cells_of`.
+
+    A cell without reading is background, one in a bar is `IGNORED`.
 
     Raises:
-        DatasetError: if the frame has no labels or no depth.
-        InputError: if a label or a depth is not what it must be.
+        DatasetError: if the frame has no labels or no depth, or one of them is not what it must be.
     """
     if frame.labels is None or frame.depth_m is None:
         raise DatasetError(f"frame {frame.index} cannot be judged: {frame.problem or 'no labels'}")
-    truth = labels_to_network(frame.labels)
-    hole = network_input(frame.depth_m, frame.camera.fx)[3] == HOLE
-    return np.where(hole & (truth != IGNORED), np.uint8(BACKGROUND), truth)
+    checked(frame, "labels to judge by")
+    fit = letterbox(frame.depth_m.shape[1], frame.depth_m.shape[0])
+    truth = np.full((INPUT_HEIGHT, INPUT_WIDTH), IGNORED, dtype=np.uint8)
+    inside = truth[fit.top : fit.top + fit.rows, fit.left : fit.left + fit.columns]
+    inside[:] = cells_of(frame.depth_m, frame.labels, fit.rows, fit.columns)[1]
+    return truth
 
 
 def evaluate(
