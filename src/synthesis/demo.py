@@ -61,8 +61,7 @@ def demo_scene(sensor: Sensor, outfit: np.random.Generator) -> Scene:
 def write_demo_sequence(folder: Path, seed: int = 0) -> None:
     """Write the demo: 5 s at 30 Hz, 320 x 240, depth in mm, true labels and true joints.
 
-    The joints are those of the person's own skeleton, and the labels those of the true surface, so
-    at the silhouette they differ from the noisy depth by a pixel.
+    The joints are those of the person's own skeleton; labels say what the noisy depth shows.
 
     Args:
         folder: Where to; a sequence that is there is replaced.
