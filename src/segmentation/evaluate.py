@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
+from numba import njit
 from numpy import ndarray
 
 from kintrack.errors import DatasetError
 from kintrack.sequence.frame import Frame
 from segmentation.labels import BACKGROUND, IGNORED, INPUT_HEIGHT, INPUT_WIDTH, LABELS
-from segmentation.picture import cells_of, checked
-from segmentation.preprocess import letterbox
+from segmentation.picture import checked
+from segmentation.preprocess import cell_samples, letterbox
 from segmentation.runtime import Segmenter
 
 N = len(LABELS)
@@ -88,7 +89,7 @@ def scores_of(counts: Int[ndarray, "7 7"]) -> Scores:
 
 
 def true_labels(frame: Frame) -> UInt8[ndarray, "106 128"]:
-    """The truth at the network's size: what the readings of a cell show, see `picture.cells_of`.
+    """The truth at the network's size: the label of the reading that a network's cell shows.
 
     A cell without reading is background, one in a bar is `IGNORED`.
 
@@ -98,10 +99,9 @@ def true_labels(frame: Frame) -> UInt8[ndarray, "106 128"]:
     if frame.labels is None or frame.depth_m is None:
         raise DatasetError(f"frame {frame.index} cannot be judged: {frame.problem or 'no labels'}")
     checked(frame, "labels to judge by")
-    fit = letterbox(frame.depth_m.shape[1], frame.depth_m.shape[0])
+    height, width = frame.depth_m.shape
     truth = np.full((INPUT_HEIGHT, INPUT_WIDTH), IGNORED, dtype=np.uint8)
-    inside = truth[fit.top : fit.top + fit.rows, fit.left : fit.left + fit.columns]
-    inside[:] = cells_of(frame.depth_m, frame.labels, fit.rows, fit.columns)[1]
+    _fill_shown(np.asarray(frame.depth_m), frame.labels, letterbox(width, height), truth)
     return truth
 
 
@@ -138,3 +138,35 @@ def evaluate(
 
 def _share(part: int, whole: int) -> float:
     return float(part / whole) if whole else float("nan")
+
+
+@njit(cache=True)
+def _fill_shown(depth, labels, fit, out):
+    """Labels of the readings that `preprocess.network_input` takes; `IGNORED` holes stay that."""
+    rows, down = cell_samples(fit.rows, fit.height)
+    columns, across = cell_samples(fit.columns, fit.width)
+    tall, wide = labels.shape
+    most = rows.shape[1] * columns.shape[1]
+    found, seen = np.empty(most), np.empty(most, dtype=np.uint8)
+    for i in range(fit.rows):
+        for j in range(fit.columns):
+            n = 0
+            unread = np.uint8(BACKGROUND)
+            for a in range(down[i]):
+                for b in range(across[j]):
+                    v, u = rows[i, a], columns[j, b]
+                    label = labels[
+                        (2 * v + 1) * tall // (2 * fit.height),
+                        (2 * u + 1) * wide // (2 * fit.width),
+                    ]
+                    if depth[v, u] <= 0.0:
+                        unread = label if label == IGNORED else unread
+                        continue
+                    k = n
+                    while k > 0 and found[k - 1] > depth[v, u]:
+                        found[k], seen[k] = found[k - 1], seen[k - 1]
+                        k -= 1
+                    found[k], seen[k] = depth[v, u], label
+                    n += 1
+            read = n > 0 and 2 * n >= down[i] * across[j]
+            out[fit.top + i, fit.left + j] = seen[(n - 1) // 2] if read else unread

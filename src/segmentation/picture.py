@@ -41,7 +41,9 @@ def reduced(
 ) -> Picture:
     """A frame at the size in which it is packed.
 
-    A frame smaller than a pack's pictures is kept as it is.
+    Depth is a reading that was there, the lower median of a cell's, as in `preprocess.py`; labels
+    are the most frequent of a cell's readings, of equals that of the reading taken, so that both
+    show one surface. A frame smaller than a pack's pictures is kept as it is.
 
     Args:
         depth_m: Depth [m], finite, 0 = no reading, shape (h, w).
@@ -52,31 +54,12 @@ def reduced(
     height, width = depth_m.shape
     scale = min(WIDTH / width, HEIGHT / height, 1.0)
     columns, rows = max(1, round(width * scale)), max(1, round(height * scale))
-    depth, votes = cells_of(depth_m, labels, rows, columns)
-    if color is not None:
-        color = np.asarray(cv2.resize(color, (columns, rows), interpolation=cv2.INTER_AREA))
-    return Picture(depth, color, votes, focal_px * columns / width)
-
-
-def cells_of(
-    depth_m: Float[ndarray, "h w"], labels: UInt8[ndarray, "h2 w2"], rows: int, columns: int
-) -> tuple[Float[ndarray, "r c"], UInt8[ndarray, "r c"]]:
-    """Depth [m] and labels of cells.
-
-    Depth is a reading that was there, the lower median of a cell's, as in `preprocess.py`; labels
-    are the most frequent of a cell's readings, of equals that of the reading taken, so that both
-    show one surface. A cell of which less than half reads is a hole and background.
-
-    Args:
-        depth_m: Depth [m], finite, 0 = no reading.
-        labels: 0 to 6 or `IGNORED`, in any size with that aspect.
-        rows: Cells down the image.
-        columns: Cells across it.
-    """
     depth = np.zeros((rows, columns), dtype=np.float32)
     votes = np.full((rows, columns), BACKGROUND, dtype=np.uint8)
     _reduce(np.ascontiguousarray(depth_m, dtype=np.float32), labels, depth, votes)
-    return depth, votes
+    if color is not None:
+        color = np.asarray(cv2.resize(color, (columns, rows), interpolation=cv2.INTER_AREA))
+    return Picture(depth, color, votes, focal_px * columns / width)
 
 
 def checked(frame: Frame, where: object) -> None:

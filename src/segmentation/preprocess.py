@@ -217,7 +217,7 @@ def cell_bounds(i, cells, pixels):
 
 
 @njit(cache=True)
-def _samples(cells, pixels):
+def cell_samples(cells, pixels):
     """Evenly spread pixels of every cell along one axis, and how many there are of them."""
     at = np.zeros((cells, SAMPLES), dtype=np.int64)
     count = np.empty(cells, dtype=np.int64)
@@ -231,8 +231,8 @@ def _samples(cells, pixels):
 
 @njit(cache=True)
 def _fill_depth(depth, fit, unit, out):
-    rows, down = _samples(fit.rows, fit.height)
-    columns, across = _samples(fit.columns, fit.width)
+    rows, down = cell_samples(fit.rows, fit.height)
+    columns, across = cell_samples(fit.columns, fit.width)
     found = np.empty(SAMPLES * SAMPLES, dtype=np.float32)
     for i in range(fit.rows):
         for j in range(fit.columns):

@@ -124,9 +124,9 @@ hides a third of the person; its farthest point lies 30, 45 or 60 cm before her 
 
 {_grid(tables.parts(content))}
 
-A tracker uses labels of the depth image's pixels, every other one of 512 x 424. At the network's size
-a second look is judged by the label in the middle of a cell, and its own cells lie askew to those:
-parts a few cells wide lose by that. At the pixels:
+The truth of a cell is the label of the reading that the network is shown there. A second look is judged
+by the label in the middle of a cell, and its own cells lie askew to those: parts a few cells wide lose by
+that. A tracker uses labels of the depth image's pixels, every other one of 512 x 424. At those:
 
 {_grid(tables.of_pixels(content))}
 

@@ -9,6 +9,14 @@ from kintrack.errors import DatasetError
 from kintrack.sequence.frame import Frame
 from segmentation.evaluate import confusion, evaluate, iou_of, scores_of, true_labels
 from segmentation.labels import IGNORED
+from segmentation.preprocess import (
+    DEPTH_SCALE,
+    HOLE,
+    REFERENCE_DEPTH_M,
+    REFERENCE_FOCAL_PX,
+    letterbox,
+    network_input,
+)
 
 
 def test_scores_are_those_counted_by_hand():
@@ -59,6 +67,30 @@ def test_a_cell_without_reading_is_background_in_truth():
     frame = next(frames())
     truth = true_labels(frame)
     assert (frame.labels[60:90, 60:90] > 0).any() and (truth[41:59, 41:59] == 0).all()
+
+
+def test_truth_is_the_label_of_the_reading_that_a_cell_of_the_input_shows(monkeypatch):
+    monkeypatch.setattr(
+        "segmentation.preprocess.add_relief", lambda plane, farthest, out: np.copyto(out, plane)
+    )
+    depth, _, labels = figure(0)
+    rng = np.random.default_rng(0)
+    depth = (depth + 1e-3 * rng.random(depth.shape)).astype(np.float32)
+    depth[rng.random(depth.shape) < 0.3] = 0.0
+    labels[rng.random(labels.shape) < 0.1] = 0
+    plane = network_input(depth, CAMERA.fx)[3]
+    truth = true_labels(Frame(0, 0.0, CAMERA, depth, labels=labels))
+    fit = letterbox(CAMERA.width, CAMERA.height)
+    unit_m = REFERENCE_DEPTH_M * CAMERA.fx * fit.scale / REFERENCE_FOCAL_PX
+    read = (plane < HOLE) & (truth != IGNORED)
+    order = np.argsort(depth, axis=None)
+    shown_m = unit_m * np.exp(DEPTH_SCALE * plane[read].astype(float))
+    ranks = np.searchsorted(depth.reshape(-1)[order], shown_m * (1.0 - 1e-7))
+    nearby = np.stack([order[np.clip(ranks + k, 0, len(order) - 1)] for k in range(-4, 5)])
+    off = np.abs(depth.reshape(-1)[nearby] - shown_m)
+    taken = nearby[off.argmin(axis=0), np.arange(len(shown_m))]
+    assert read.sum() > 5000 and (truth[~read] % IGNORED == 0).all()
+    assert (labels.reshape(-1)[taken] == truth[read]).mean() > 0.99
 
 
 def test_recordings_without_labels_cannot_be_evaluated():
