@@ -40,7 +40,7 @@ class PullConfig:
 
     sigma_m: float = 0.1
     """Standard deviation of a joint about its part's place, beyond the free distance [m]."""
-    free_m: float = 0.25
+    free_m: float = 0.18
     """A joint this near to its part's place is not pulled [m]."""
 
     def __post_init__(self) -> None:
