@@ -15,7 +15,7 @@ from numpy import ndarray
 from kintrack.errors import DatasetError
 from kintrack.sequence.frame import Frame
 from segmentation.labels import BACKGROUND, IGNORED, INPUT_HEIGHT, INPUT_WIDTH, LABELS
-from segmentation.picture import checked
+from segmentation.picture import checked, keep_sorted
 from segmentation.preprocess import cell_samples, letterbox
 from segmentation.runtime import Segmenter
 
@@ -162,11 +162,7 @@ def _fill_shown(depth, labels, fit, out):
                     if depth[v, u] <= 0.0:
                         unread = label if label == IGNORED else unread
                         continue
-                    k = n
-                    while k > 0 and found[k - 1] > depth[v, u]:
-                        found[k], seen[k] = found[k - 1], seen[k - 1]
-                        k -= 1
-                    found[k], seen[k] = depth[v, u], label
+                    keep_sorted(found, seen, n, depth[v, u], label)
                     n += 1
             read = n > 0 and 2 * n >= down[i] * across[j]
             out[fit.top + i, fit.left + j] = seen[(n - 1) // 2] if read else unread

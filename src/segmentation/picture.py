@@ -80,6 +80,16 @@ def checked(frame: Frame, where: object) -> None:
 
 
 @njit(cache=True, nogil=True)
+def keep_sorted(depths, labels, count, depth, label):
+    """Put a reading with its label among the first `count`, which ascend in depth."""
+    k = count
+    while k > 0 and depths[k - 1] > depth:
+        depths[k], labels[k] = depths[k - 1], labels[k - 1]
+        k -= 1
+    depths[k], labels[k] = depth, label
+
+
+@njit(cache=True, nogil=True)
 def most_frequent(labels, count):
     """The most frequent of the first labels; of equals the middle one's, else the first's."""
     best, most = labels[0], 0
@@ -112,11 +122,7 @@ def _reduce(depth, labels, out, votes):
                     if d <= 0.0:
                         unread = label if label == IGNORED else unread
                         continue
-                    k = n
-                    while k > 0 and found[k - 1] > d:
-                        found[k], seen[k] = found[k - 1], seen[k - 1]
-                        k -= 1
-                    found[k], seen[k] = d, label
+                    keep_sorted(found, seen, n, d, label)
                     n += 1
             if n > 0 and 2 * n >= (v1 - v0) * (u1 - u0):
                 out[i, j], votes[i, j] = found[(n - 1) // 2], most_frequent(seen, n)

@@ -66,7 +66,7 @@ class Recipe(NamedTuple):
     """Run whose weights it begins with; random ones if empty."""
 
 
-SHIPPED = Recipe(
+FIRST_LEG = Recipe(
     "ship",
     "unet",
     ("--background-weight", "0.25", "--augment.region", "0.6", "--augment.other-room", "0.2"),
@@ -74,10 +74,10 @@ SHIPPED = Recipe(
 )
 """A U-Net of half the usual width: as many weights as Fast-FCN, and a logit sees the whole person,
 which tells sides and things apart."""
-AGAIN = SHIPPED._replace(name="ship_again", start=SHIPPED.name)
+SECOND_LEG = FIRST_LEG._replace(name="ship_again", start=FIRST_LEG.name)
 """What ships: the same once more from its weights, with other draws and a warm restart of the
 learning rate (Loshchilov & Hutter 2017) to half of its height."""
-AGAIN_SHARE = 4_000 / STEPS["ship"]
+SECOND_SHARE = 4_000 / STEPS["ship"]
 """Length of that, share of the first training's."""
 COMPARED = (
     Recipe("fast_fcn", "fast_fcn"),
@@ -99,8 +99,10 @@ def main() -> int:
         _build(folder, arguments.data, frames, arguments.quick)
     steps = 4 if arguments.quick else arguments.steps
     if arguments.what == "ship":
-        _train(folder, SHIPPED, steps, arguments)
-        print(f"written: {_train(folder, AGAIN, max(1, round(AGAIN_SHARE * steps)), arguments)}")
+        _train(folder, FIRST_LEG, steps, arguments)
+        print(
+            f"written: {_train(folder, SECOND_LEG, max(1, round(SECOND_SHARE * steps)), arguments)}"
+        )
         return 0
     files = {recipe.name: _train(folder, recipe, steps, arguments) for recipe in COMPARED}
     tables = [recipe.name for recipe in COMPARED[:4]]

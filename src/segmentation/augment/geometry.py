@@ -17,7 +17,7 @@ from numba import njit
 from numpy import ndarray
 
 from segmentation.labels import BACKGROUND, IGNORED, INPUT_HEIGHT, INPUT_WIDTH, MIRRORED
-from segmentation.picture import Picture, most_frequent
+from segmentation.picture import Picture, keep_sorted, most_frequent
 from segmentation.preprocess import REFERENCE_DEPTH_M, letterbox
 from segmentation.region import cells_per_pixel
 
@@ -204,12 +204,8 @@ def _warp(depth, labels, M, swap, window_columns, window_rows, out, out_labels):
                 if depth[y, x] <= 0.0:
                     unread = label if label == IGNORED else unread
                     continue
-                at = n
-                while at > 0 and readings[at - 1] > depth[y, x]:
-                    readings[at], seen[at] = readings[at - 1], seen[at - 1]
-                    at -= 1
-                readings[at] = depth[y, x]
-                seen[at] = swap[label] if label < swap.size else label
+                side = swap[label] if label < swap.size else label
+                keep_sorted(readings, seen, n, depth[y, x], side)
                 n += 1
             if 2 * inside < 4:
                 continue
