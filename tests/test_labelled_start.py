@@ -116,6 +116,14 @@ def test_nobody_is_found_where_nobody_is_labelled(scene):
     assert start_from_labels(scene.human, replace(observation, labels=None), T, CONFIG) is None
 
 
+def test_limbs_alone_are_no_body(scene):
+    observation = labelled(scene, scene.place(None, 0.0, at=(2.9, 0.2, 0.0)))
+    legs = np.where(observation.labels >= 5, observation.labels, 0).astype(np.uint8)
+    alone = replace(observation, labels=legs, region=legs > 0)
+    assert start_from_labels(scene.human, observation, T, CONFIG) is not None
+    assert start_from_labels(scene.human, alone, T, CONFIG) is None
+
+
 def test_the_same_frame_gives_the_same_start_to_the_bit(scene):
     observation = labelled(scene, scene.place(STEPPING_DEG, 100.0))
     one, two = (start_from_labels(scene.human, observation, T, CONFIG) for _ in range(2))

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, UInt8
 from numpy import ndarray
 
 from kintrack.association.observation import Observation
-from kintrack.association.silhouette import outside_pairs, silhouette
+from kintrack.association.silhouette import outside_pairs
 from kintrack.association.visibility import visible_vertices
 from kintrack.association.window import associate
 from kintrack.body import BodyState, run_kinematics
@@ -104,7 +104,6 @@ def fit_pose(
         0,
         None,
     )
-    outline = silhouette(observation)
     remaining = list(gates_m)
     while remaining:
         gate_m = remaining.pop(0)
@@ -122,7 +121,6 @@ def fit_pose(
             config.association.part_m,
         )
         beside = outside_pairs(
-            outline,
             observation,
             view.vertices_camera,
             view.visible,

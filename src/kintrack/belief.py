@@ -161,11 +161,12 @@ def rest_priors(
     unseen: Bool[ndarray, " nv"],
     hidden: Bool[ndarray, " nv"],
     frames: float,
+    stance: Float[ndarray, " 3"] | None = None,
 ) -> list[TangentPrior]:
-    """Towards rest, slowly what is not found; hidden legs towards the postures that legs take.
+    """Towards rest, slowly what is not found; lost legs towards the postures that legs take.
 
-    Legs carry the body and go with it: once a hinge of them is hidden, the mixture holds both. A
-    hidden arm may do anything: it is left to its habit.
+    Legs carry the body and go with it: once a hinge of them is hidden, or not found where it is
+    expected, the mixture holds both. A hidden arm may do anything: it is left to its habit.
 
     Args:
         legs: What postures legs take.
@@ -175,14 +176,16 @@ def rest_priors(
         unseen: Hinges that were not found.
         hidden: Hinges that are hidden.
         frames: In so many frames a limb that is not found relaxes.
+        stance: The pelvis' stance, see `residuals.pose_prior`; unknown if None.
     """
     slowly = np.where(unseen, np.sqrt(max(frames, 1.0)), 1.0)
-    if not hidden[legs.hinges].any():
+    lost = hidden | unseen
+    if not lost[legs.hinges].any():
         return [diagonal_prior(resting, np.where(hidden, np.inf, slowly * sigma))]
     free = hidden.copy()
     free[legs.hinges] = True
     held = diagonal_prior(resting, np.where(free, np.inf, slowly * sigma))
-    return [legs.near(q, np.where(hidden, 1.0, slowly), hidden), held]
+    return [legs.near(q, None, lost, stance), held]
 
 
 def updated(
@@ -249,6 +252,7 @@ def tracking_priors(
     hidden: Bool[ndarray, " nv"],
     timestamp_s: float,
     config: TrackerConfig,
+    stance: Float[ndarray, " 3"] | None = None,
 ) -> list[TangentPrior]:
     """What is known of a tracked body before its pixels are asked: its motion, and its posture.
 
@@ -262,10 +266,11 @@ def tracking_priors(
         hidden: Hinges that are hidden.
         timestamp_s: Now [s].
         config: Motion and times.
+        stance: The pelvis' stance where the body is expected; unknown if None.
     """
     surely = spread(awaited.body, belief, hidden, timestamp_s, config.motion, rest_sigma)
     frames = config.prior.unseen_s / belief.step_s(timestamp_s)
     return [
         gaussian_prior(awaited.q, surely),
-        *rest_priors(legs, resting, rest_sigma, awaited.q, unseen, hidden, frames),
+        *rest_priors(legs, resting, rest_sigma, awaited.q, unseen, hidden, frames, stance),
     ]

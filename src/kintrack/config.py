@@ -42,9 +42,10 @@ class AssociationConfig:
     """A vertex further than this behind the body's own depth buffer is hidden [m]."""
     pixel_pairs: int = 700
     """About how many observed pixels look for their vertex."""
-    background_share: float = 0.5
-    """With readings on fewer of the pixels than this, the background was taken out and an empty
-    pixel is free space; with more, an empty pixel is the sensor's failure and says nothing."""
+    background_share: float = 0.1
+    """With readings that no label calls hers on fewer of the pixels than this, the background was
+    taken out and an empty pixel is free space; with more, it is the sensor's failure and says
+    nothing."""
     region_margin_m: float = 0.35
     """Observed points further than this from the predicted body's box are ignored [m]."""
     part_m: float = 0.08

@@ -25,7 +25,7 @@ from kintrack.lifecycle import Life, LifecycleConfig, Reading
 from kintrack.person import LabelledConfig, geometric_lifecycle
 from kintrack.reporting import empty_result
 from kintrack.residuals.contact import Contact
-from kintrack.residuals.pose_prior import load_leg_prior
+from kintrack.residuals.pose_prior import leg_length, load_leg_prior, stance_of
 from kintrack.result import FrameResult
 from kintrack.rivals import Duel, Vigil
 from kintrack.segmenter import Segmenter, Watched
@@ -33,6 +33,8 @@ from kintrack.sequence.frame import Frame
 from kintrack.skin import skinned_vertices
 from kintrack.solver.choice import check_installed
 from kintrack.whereabouts import Whereabouts
+
+UP_WORLD = np.array([0.0, 0.0, 1.0])
 
 
 class Memory:
@@ -88,6 +90,7 @@ class Memory:
         self._resting = posed(human.body, RESTING_DEG)
         self._legs = load_leg_prior(human.body, self.config.prior)
         self._prior_sigma = prior_sigma(human.body, self.config.prior)
+        self._leg_m = leg_length(human.body)
         self._soles = soles_of(human)
 
     def _wear(self, surface: Surface | None) -> None:
@@ -111,7 +114,7 @@ class Memory:
         self.belief, self.reading, self.surface = other.belief, other.reading, other.surface
         self._met, self.human, self._fitted = other._met, other.human, other._fitted
         self._resting, self._prior_sigma = other._resting, other._prior_sigma
-        self._legs = other._legs
+        self._legs, self._leg_m = other._legs, other._leg_m
         self._life, self._where, self._soles = other._life, other._where, other._soles
 
     def _lifecycle(self, observation: Observation) -> LifecycleConfig:
@@ -131,6 +134,13 @@ class Memory:
         if self._ground.floor is None or not lost[ankles].any():
             return None
         return Contact(self._ground.floor, self._soles[lost[ankles]])
+
+    def _stance(self, state: BodyState) -> Float[ndarray, " 3"]:
+        """How a body's pelvis is tilted, and how high it is if there is a floor."""
+        floor = self._ground.floor
+        if floor is None:
+            return stance_of(state.q, self._leg_m, UP_WORLD, np.nan)
+        return stance_of(state.q, self._leg_m, floor.normal, floor.height_m)
 
     def _look_down(self, state: BodyState, observation: Observation, now_s: float) -> None:
         """Look for the floor from time to time."""

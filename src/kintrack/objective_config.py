@@ -57,17 +57,14 @@ class PriorConfig:
     """Standard deviation of spine, neck, head and clavicle hinges about zero [rad]."""
     twist_rad: float = 0.5
     """Standard deviation of forearm, wrist and ankle hinges about zero [rad]."""
-    spread: float = 1.5
-    """Factor on the standard deviations of the postures that legs take, while one is hidden."""
     floor_rad: float = 0.1
-    """Standard deviation of every hinge of theirs besides [rad]."""
+    """Standard deviation of every hinge of a leg, besides that of the posture it takes [rad]."""
     unseen_s: float = 2.0
     """Time in which a limb that is not found, though nothing hides it, relaxes towards rest [s]."""
 
     def __post_init__(self) -> None:
         check_bounds(
             self,
-            spread=(0.1, 100),
             floor_rad=(0.001, 10),
             limb_rad=(0.01, 10),
             trunk_rad=(0.01, 10),

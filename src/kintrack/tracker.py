@@ -175,6 +175,7 @@ class Tracker(Memory):
             hidden,
             now_s,
             config,
+            self._stance(awaited),
         )
         gates = np.geomspace(a.first_gate_m, a.last_gate_m, config.solver.rounds).tolist()
         try:

@@ -75,3 +75,16 @@ def test_without_background_only_what_is_mostly_labelled_takes_labels(height):
     seen = observe(Frame(0, 0.0, CAMERA, depth), 640, labels=labels)
     assert not seen.has_background
     assert seen.region.sum() == 100 * (height if height == 90 else 80)
+
+
+@pytest.mark.parametrize("wall_rows", [0, 100, 400])
+def test_a_room_may_show_little_of_itself_and_a_cut_out_person_none(wall_rows):
+    """Far walls and what is too near have no reading: an eighth that is not hers is a room."""
+    depth = np.zeros((481, 640), dtype=np.float32)
+    depth[:wall_rows] = 4.0
+    depth[100:400, 300:340] = 2.0
+    labels = np.zeros((481, 640), dtype=np.uint8)
+    labels[100:400, 300:340] = 2
+    seen = observe(Frame(0, 0.0, CAMERA, depth), 640, labels=labels)
+    assert seen.has_background == (wall_rows > 0)
+    assert (seen.labels > 0).sum() == 300 * 40

@@ -14,6 +14,9 @@ from kintrack.association.labelling import labels_of_pixels, spread_labels
 from kintrack.geometry import PinholeCamera
 from kintrack.sequence.frame import Frame
 
+ROOM_SHARE = 0.5
+"""A room was recorded if at least this share of the pixels has a reading, whosever it is."""
+
 
 @dataclass(frozen=True)
 class Observation:
@@ -37,7 +40,7 @@ class Observation:
 def observe(
     frame: Frame,
     max_width_px: int,
-    background_share: float = 0.5,
+    background_share: float = 0.1,
     labels: UInt8[ndarray, "*guess r c"] | None = None,
 ) -> Observation:
     """Back-project a frame, thinned to at most `max_width_px` columns.
@@ -45,7 +48,8 @@ def observe(
     Args:
         frame: A good frame.
         max_width_px: Largest working width [px].
-        background_share: Share of pixels with a reading from which a background is assumed.
+        background_share: A background is assumed if at least this share of the pixels has a reading
+            that no label calls hers, or `ROOM_SHARE` has any.
         labels: Label map that covers the whole image, in any size, or two of them, see `Segmenter`;
             None if there is none.
 
@@ -59,11 +63,13 @@ def observe(
     camera = frame.camera.scaled(factor)
     points = camera.back_project(frame.depth_m[::factor, ::factor])
     read = points[..., 2] > 0
-    has_background = bool(read.mean() >= background_share)
+    has_background = bool(read.mean() >= ROOM_SHARE)
     if labels is None:
         return Observation(camera, points, read, has_background)
     guesses = labels.reshape(-1, *labels.shape[-2:])
     part, *others = [labels_of_pixels(guess, points[..., 2]) for guess in guesses]
+    # the far walls of a room, and what is too near, may have no reading
+    has_background |= bool((read & (part == 0)).mean() >= background_share)
     if not has_background:
         part = spread_labels(part, points[..., 2])
     return Observation(camera, points, part > 0, has_background, part, *others)

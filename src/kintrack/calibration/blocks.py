@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from kintrack.alignment import view_skin
 from kintrack.association.observation import Observation
-from kintrack.association.silhouette import outside_pairs, silhouette
+from kintrack.association.silhouette import outside_pairs
 from kintrack.association.window import associate
 from kintrack.body import BodyState, run_kinematics
 from kintrack.calibration.config import BundleConfig
@@ -153,7 +153,6 @@ def surface_of(
     robust = tukey_weights(plane / np.where(plane < 0.0, config.outside * sigma, sigma), 1.0)
     inlier = robust > 0.5
     beside = outside_pairs(
-        silhouette(observation),
         observation,
         view.vertices_camera,
         view.visible,

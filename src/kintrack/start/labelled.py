@@ -21,13 +21,16 @@ from kintrack.geometry import invert_rigid
 from kintrack.human import Human, prior_sigma
 from kintrack.judge import agreement
 from kintrack.labelled_config import LabelledStartConfig
-from kintrack.people import choose, find_people, only
+from kintrack.people import HEAD, TORSO, choose, find_people, only
 from kintrack.residuals.prior import diagonal_prior
 from kintrack.settling import settle
 from kintrack.start.begun import Start
 from kintrack.start.evidence import evidence_of
 from kintrack.start.placing import guesses, view_mismatch
 from kintrack.start.postures import postures_of
+
+LEAST_TRUNK_M2 = 0.01
+"""A start needs so much of head and trunk, across the line of sight: limbs alone are no body."""
 
 
 def start_from_labels(
@@ -67,6 +70,8 @@ def start_at(
     start: LabelledStartConfig,
 ) -> Start | None:
     """Fit the body to one person's labelled points, see `start_from_labels`."""
+    if _trunk_m2(seen) < LEAST_TRUNK_M2:
+        return None
     evidence = evidence_of(seen, T_world_camera)
     vertices = len(human.skin.labels)
     tries = guesses(
@@ -105,3 +110,10 @@ def start_at(
     cost, fit, view = best
     own = settled(view)
     return Start(fit, agreement(view, own, config.judge.explained_m), own, cost)
+
+
+def _trunk_m2(seen: Observation) -> float:
+    """How much is seen of head and trunk [m^2]."""
+    assert seen.labels is not None
+    z = seen.points_camera[..., 2][(seen.labels == HEAD) | (seen.labels == TORSO)]
+    return float((z**2).sum() / (seen.camera.fx * seen.camera.fy))

@@ -2,8 +2,8 @@
 """The postures that legs take in motions that may be trained on, as a mixture of Gaussians.
 
 Every authored action is performed by several people, every captured clip given to several, and each
-of these motions counts the same, mirrored too, so that the mixture prefers no side. It is learnt
-from whole bodies and kept of the legs: arms do more than these motions show.
+of these motions counts the same, mirrored too, so that the mixture prefers no side. It is learnt of
+the pelvis' stance and the legs: arms do more than these motions show.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from kintrack.bounds import check_bounds
 from kintrack.errors import DatasetError, SceneError
 from kintrack.files import write_atomically
 from kintrack.human import leg_hinges, load_human
-from kintrack.residuals.pose_prior import hinge_names
+from kintrack.residuals.pose_prior import STANCE, hinge_names, leg_length, stance_of
 from synthesis.motions.actions import act, training_actions
 from synthesis.motions.mocap import HELD_OUT, clips_in, excerpt, load_clip
 from synthesis.motions.motion import RATE_HZ
@@ -34,13 +34,15 @@ LENGTH_S = 8.0
 STRIDE = 6
 """Every how many frames of a motion one is looked at."""
 ITERATIONS = 200
+UP = np.array([0.0, 0.0, 1.0])
+"""The floor of a motion is at z = 0."""
 
 
 @dataclass(frozen=True)
 class HabitsConfig:
     """What `kintrack model prior` makes."""
 
-    components: int = 12
+    components: int = 24
     """Gaussians before they are mirrored, 1 to 100."""
     performances: int = 16
     """People that perform every action, and half as many that every clip is given to."""
@@ -78,13 +80,14 @@ def learn_habits(
     except ImportError as error:
         raise DatasetError("scikit-learn is missing: pip install 'kintrack[model]'") from error
     body = load_human().body
-    names = hinge_names(body)
+    hinges = np.array(hinge_names(body))[leg_hinges(body)[6:]]
+    names = (*STANCE, *hinges)
     motions = _motions(mocap, config, on_progress)
     if not motions:
         raise DatasetError("no motion could be performed; a pose prior needs some")
     rng, each = np.random.default_rng((config.seed, 1)), max(len(m) for m in motions.values())
-    angles = np.vstack([m[rng.choice(len(m), each)] for m in motions.values()])
-    both = np.vstack([angles, mirrored(angles, names)])
+    postures = np.vstack([m[rng.choice(len(m), each)] for m in motions.values()])
+    both = np.vstack([postures, mirrored(postures, names)])
     if len(both) < 2 * config.components:
         raise DatasetError(f"{len(both)} postures for {config.components} components: at least "
                            f"{2 * config.components} are needed")  # fmt: skip
@@ -96,40 +99,36 @@ def learn_habits(
     ).fit(both)
     flip = mirrored(np.eye(len(names)), names)
     turned = np.einsum("ia,kij,jb->kab", flip, found.covariances_, flip)
-    means = np.concatenate([found.means_, mirrored(found.means_, names)])
-    covariances = np.concatenate([found.covariances_, turned])
-    legs = np.flatnonzero(leg_hinges(body)[6:])
     arrays: dict[str, Any] = {
-        "hinge_names": np.array(names)[legs],
+        "names": np.array(names),
         "weights": np.tile(found.weights_ / 2.0, 2),
-        "means_rad": means[:, legs],
-        "covariances_rad2": covariances[:, legs[:, None], legs].astype(np.float32),
+        "means": np.concatenate([found.means_, mirrored(found.means_, names)]),
+        "covariances": np.concatenate([found.covariances_, turned]).astype(np.float32),
     }
     write_atomically(path, lambda file: np.savez_compressed(file, **arrays))
 
 
-def mirrored(angles_rad: Float[ndarray, "n h"], names: tuple[str, ...]) -> Float[ndarray, "n h"]:
-    """The postures in a mirror: limbs change sides, the trunk turns and bends the other way.
+def mirrored(postures: Float[ndarray, "n h"], names: tuple[str, ...]) -> Float[ndarray, "n h"]:
+    """The postures in a mirror: legs change sides, the pelvis tilts to the other side.
 
     Args:
-        angles_rad: Hinge angles [rad].
-        names: Of the hinges.
+        postures: Stances and hinge angles.
+        names: Of their columns.
     """
-    out = np.empty_like(angles_rad)
+    out = np.empty_like(postures)
     for n, name in enumerate(names):
         side, _, stem = name.partition("_")
         if side in ("l", "r"):
-            out[:, n] = angles_rad[:, names.index(f"{'r' if side == 'l' else 'l'}_{stem}")]
+            out[:, n] = postures[:, names.index(f"{'r' if side == 'l' else 'l'}_{stem}")]
         else:
-            sign = -1.0 if name.endswith(("_lateral", "_rotation")) else 1.0
-            out[:, n] = sign * angles_rad[:, n]
+            out[:, n] = (-1.0 if name == "tilt_left" else 1.0) * postures[:, n]
     return out
 
 
 def _motions(
     mocap: Path | None, config: HabitsConfig, on_progress: Callable[[int, int], None]
 ) -> dict[str, Float[ndarray, "n h"]]:
-    """Hinge angles of every action and clip, all performances together [rad]."""
+    """Postures of every action and clip, all performances together."""
     clips = [] if mocap is None else [p for p in clips_in(mocap) if p.stem not in HELD_OUT]
     turns = [(name, None, n) for name in training_actions() for n in range(config.performances)]
     half = -(-config.performances // 2)
@@ -148,11 +147,15 @@ def _motions(
 
 
 def _performed(name: str, clip: Path | None, rng: np.random.Generator) -> Float[ndarray, "n h"]:
-    """Hinge angles of one performance by somebody [rad]."""
+    """Stances and leg hinges of one performance by somebody."""
     person = load_person(int(rng.choice(training_people())))
     if clip is None:
-        return act(name, person, rng, LENGTH_S).motion.q[:, 7:]
-    recorded = load_clip(clip)
-    length = min(len(recorded.times_s), int(LENGTH_S * RATE_HZ))
-    start = int(rng.integers(len(recorded.times_s) - length + 1))
-    return retarget(person, excerpt(recorded, start, length), bool(rng.random() < 0.5)).q[:, 7:]
+        q = act(name, person, rng, LENGTH_S).motion.q
+    else:
+        recorded = load_clip(clip)
+        length = min(len(recorded.times_s), int(LENGTH_S * RATE_HZ))
+        start = int(rng.integers(len(recorded.times_s) - length + 1))
+        q = retarget(person, excerpt(recorded, start, length), bool(rng.random() < 0.5)).q
+    body = person.body
+    stances = stance_of(q, leg_length(body), UP, 0.0)
+    return np.hstack([stances, q[:, 1 + np.flatnonzero(leg_hinges(body))]])
