@@ -269,3 +269,10 @@ def joint_jacobians(state: BodyState) -> Float[ndarray, "j 3 nv"]:
 
 
 _NEXT, _AFTER = [1, 2, 0], [2, 0, 1]
+
+
+def leg_length(body: Body) -> float:
+    """From hip through knee to ankle, left [m]."""
+    joints = run_kinematics(body, body.neutral()).joint_positions_world
+    hip, knee, ankle = (joints[JOINT_NAMES.index(f"l_{n}")] for n in ("hip", "knee", "ankle"))
+    return float(np.linalg.norm(hip - knee) + np.linalg.norm(knee - ankle))

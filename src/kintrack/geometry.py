@@ -29,6 +29,8 @@ T_LEVEL_WORLD_CAMERA = np.array(
     [[0.0, 0.0, 1.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 )
 """World of a level camera that nobody has placed: its own centre, x along the view, z up."""
+UP_WORLD = np.array([0.0, 0.0, 1.0])
+"""Up in the world frame."""
 
 
 @dataclass(frozen=True)

@@ -14,18 +14,18 @@ from threadpoolctl import ThreadpoolController
 from kintrack.alignment import View, view_skin
 from kintrack.association.observation import Observation
 from kintrack.belief import Belief
-from kintrack.body import BodyState
+from kintrack.body import BodyState, leg_length
 from kintrack.clothing import dressed_human
 from kintrack.config import TrackerConfig
 from kintrack.deformation.surface import Surface, met
 from kintrack.floor import Ground, soles_of
-from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid
+from kintrack.geometry import T_LEVEL_WORLD_CAMERA, UP_WORLD, invert_rigid
 from kintrack.human import RESTING_DEG, Human, posed, prior_sigma
 from kintrack.lifecycle import Life, LifecycleConfig, Reading
 from kintrack.person import LabelledConfig, geometric_lifecycle
 from kintrack.reporting import empty_result
 from kintrack.residuals.contact import Contact
-from kintrack.residuals.pose_prior import leg_length, load_leg_prior, stance_of
+from kintrack.residuals.pose_prior import load_leg_prior, stance_of
 from kintrack.result import FrameResult
 from kintrack.rivals import Duel, Vigil
 from kintrack.segmenter import Segmenter, Watched
@@ -33,8 +33,6 @@ from kintrack.sequence.frame import Frame
 from kintrack.skin import skinned_vertices
 from kintrack.solver.choice import check_installed
 from kintrack.whereabouts import Whereabouts
-
-UP_WORLD = np.array([0.0, 0.0, 1.0])
 
 
 class Memory:

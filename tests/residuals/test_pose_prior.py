@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kintrack.belief import rest_priors
-from kintrack.body import run_kinematics
+from kintrack.body import leg_length, run_kinematics
 from kintrack.errors import ModelError
 from kintrack.human import RESTING_DEG, SITTING_DEG, leg_hinges, posed, prior_sigma
 from kintrack.objective_config import PriorConfig
@@ -14,7 +14,6 @@ from kintrack.residuals.pose_prior import (
     PRIOR_FILE,
     STANCE,
     hinge_names,
-    leg_length,
     load_leg_prior,
     stance_of,
 )

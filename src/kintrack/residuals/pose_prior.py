@@ -20,10 +20,9 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
-from kintrack.body import Body, run_kinematics
+from kintrack.body import Body
 from kintrack.errors import ModelError
 from kintrack.human import leg_hinges
-from kintrack.joints import JOINT_NAMES
 from kintrack.objective_config import PriorConfig
 from kintrack.residuals.prior import TangentPrior
 from kintrack.rig import model_folder, read_arrays
@@ -121,7 +120,7 @@ def stance_of(
 
     Args:
         q: Configurations.
-        leg_m: Length of a leg, see `leg_length`.
+        leg_m: Length of a leg, see `kintrack.body.leg_length`.
         up_world: Unit vector that points up.
         floor_m: Where along it the floor is [m]; NaN if unknown, and so is the height then.
 
@@ -131,13 +130,6 @@ def stance_of(
     up = Rotation.from_quat(q[..., 3:7]).apply(up_world, inverse=True)
     height = HEIGHTS_PER_LEG * (q[..., :3] @ up_world - floor_m) / leg_m
     return np.concatenate([up[..., :2], height[..., None]], axis=-1)
-
-
-def leg_length(body: Body) -> float:
-    """From hip through knee to ankle, left [m]."""
-    joints = run_kinematics(body, body.neutral()).joint_positions_world
-    hip, knee, ankle = (joints[JOINT_NAMES.index(f"l_{n}")] for n in ("hip", "knee", "ankle"))
-    return float(np.linalg.norm(hip - knee) + np.linalg.norm(knee - ankle))
 
 
 def load_leg_prior(body: Body, config: PriorConfig, folder: Path | None = None) -> LegPrior:

@@ -17,11 +17,13 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from kintrack.body import leg_length
 from kintrack.bounds import check_bounds
 from kintrack.errors import DatasetError, SceneError
 from kintrack.files import write_atomically
+from kintrack.geometry import UP_WORLD
 from kintrack.human import leg_hinges, load_human
-from kintrack.residuals.pose_prior import STANCE, hinge_names, leg_length, stance_of
+from kintrack.residuals.pose_prior import STANCE, hinge_names, stance_of
 from synthesis.motions.actions import act, training_actions
 from synthesis.motions.mocap import HELD_OUT, clips_in, excerpt, load_clip
 from synthesis.motions.motion import RATE_HZ
@@ -34,8 +36,6 @@ LENGTH_S = 8.0
 STRIDE = 6
 """Every how many frames of a motion one is looked at."""
 ITERATIONS = 200
-UP = np.array([0.0, 0.0, 1.0])
-"""The floor of a motion is at z = 0."""
 
 
 @dataclass(frozen=True)
@@ -157,5 +157,5 @@ def _performed(name: str, clip: Path | None, rng: np.random.Generator) -> Float[
         start = int(rng.integers(len(recorded.times_s) - length + 1))
         q = retarget(person, excerpt(recorded, start, length), bool(rng.random() < 0.5)).q
     body = person.body
-    stances = stance_of(q, leg_length(body), UP, 0.0)
+    stances = stance_of(q, leg_length(body), UP_WORLD, 0.0)
     return np.hstack([stances, q[:, 1 + np.flatnonzero(leg_hinges(body))]])

@@ -9,10 +9,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.body import run_kinematics
+from kintrack.body import leg_length, run_kinematics
 from kintrack.joints import JOINT_NAMES
 from kintrack.skin import skinned_vertices
-from synthesis.motions.motion import leg_length
 from synthesis.people.person import Person
 
 TRUNK_LINKS = ("pelvis", "abdomen", "chest")
@@ -79,7 +78,7 @@ def measure(person: Person) -> Measures:
     ]
     bones = ("l_shoulder", "l_elbow", "l_wrist")
     return Measures(
-        leg_m=leg_length(person),
+        leg_m=leg_length(person.body),
         arm_m=float(sum(np.linalg.norm(np.diff([joint[b] for b in bones], axis=0), axis=1))),
         shoulder=joint["l_shoulder"] - chest,
         eyes=joint["head"] - chest,

@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from kintrack.body import leg_length
 from synthesis.motions.curves import keyed, smooth
 from synthesis.motions.footwork import (
     Footwork,
@@ -111,7 +112,7 @@ def perform(person: Person, script: Script, rate_hz: float = RATE_HZ) -> Motion:
     }
     legs = np.array([body.dof(f"{s}_{hinge}") + 1 for s in SIDES for hinge in LEG_HINGES])
     bent = np.radians(2 * BENT_DEG)
-    longest_m = REACH * leg_length(person)
+    longest_m = REACH * leg_length(person.body)
     hips = {side: neutral_position(person, f"{side}_thigh") for side in SIDES}
     for n, T in enumerate(_pelvis_path(person, feet, pelvis, script.gait, rate_hz)):
         q[n, :7] = pin.SE3ToXYZQUAT(T)
@@ -123,12 +124,6 @@ def perform(person: Person, script: Script, rate_hz: float = RATE_HZ) -> Motion:
         q[n] = solve_legs(body, q[n], targets)
         bent = q[n, legs]
     return Motion(times_s, q, {side: feet[side].planted for side in SIDES})
-
-
-def leg_length(person: Person) -> float:
-    """Hip to ankle of the straight leg [m]."""
-    hip, knee, ankle = (neutral_position(person, f"l_{s}") for s in ("thigh", "shank", "foot"))
-    return float(np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee))
 
 
 def _idle(times_s: Float[ndarray, " n"], phase_rad: float) -> dict[str, Float[ndarray, " n"]]:
@@ -159,7 +154,7 @@ def _pelvis_path(
     between = 0.5 * (left.footholds + right.footholds + lean[:, None] * aside)
     between[:, 2] -= between[0, 2]
     between = smooth(between, rate_hz, gait.follow_s)
-    leg_m = leg_length(person)
+    leg_m = leg_length(person.body)
     ankle_x = 0.5 * (left.footholds[0, 0] + right.footholds[0, 0])
     ahead_m = leg_m * pelvis["forward"] - ankle_x
     angles = np.radians([pelvis["roll"], pelvis["pitch"], pelvis["yaw"]]).T

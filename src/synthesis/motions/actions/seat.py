@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from kintrack.body import run_kinematics
+from kintrack.body import leg_length, run_kinematics
 from kintrack.geometry import invert_rigid
 from kintrack.skin import skinned_vertices
 from synthesis.motions.actions.frames import draw_thing, place_of, pose, through, upright_chest
@@ -18,7 +18,7 @@ from synthesis.motions.actions.mood import Mood, pick, toss
 from synthesis.motions.footwork import Stance, neutral_position
 from synthesis.motions.holding import HandPath, frame_path, reach
 from synthesis.motions.measures import measure
-from synthesis.motions.motion import RATE_HZ, Motion, Script, leg_length, perform
+from synthesis.motions.motion import RATE_HZ, Motion, Script, perform
 from synthesis.motions.poses import still
 from synthesis.objects.thing import Thing
 from synthesis.people.person import SIDES, Person
@@ -69,7 +69,7 @@ def draw_seated(person: Person, rng: np.random.Generator, mood: Mood, things: Ma
         things, pick(rng, *(name for name in ("stool", "chair") if name in things)), rng
     )
     height = float(place_of(seat, "seat")[2, 3])
-    leg_m = leg_length(person)
+    leg_m = leg_length(person.body)
     hip, knee = (neutral_position(person, f"l_{name}") for name in ("thigh", "shank"))
     thigh_m = float(np.linalg.norm(knee - hip))
     ahead = -(thigh_m * rng.uniform(0.86, 1.04)) / leg_m

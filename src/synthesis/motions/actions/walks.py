@@ -10,11 +10,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from kintrack.body import leg_length
 from synthesis.motions.actions.mood import Mood, draw_mood, pick, toss
 from synthesis.motions.arms import arm
 from synthesis.motions.curves import keyed
 from synthesis.motions.footwork import Gait, Step
-from synthesis.motions.motion import RATE_HZ, Motion, leg_length, perform
+from synthesis.motions.motion import RATE_HZ, Motion, perform
 from synthesis.motions.performance import Performance
 from synthesis.motions.placing import floor_pose, moved
 from synthesis.motions.poses import Pose, sided
@@ -147,7 +148,7 @@ def draw_walk(
     )
     kind = pick(rng, *PATHS) if kind is None else kind
     brisk = rng.uniform(*speed)
-    length = leg_length(person) * rng.uniform(0.68, 0.84) * brisk**0.5
+    length = leg_length(person.body) * rng.uniform(0.68, 0.84) * brisk**0.5
     step_s = 1.0 / (rng.uniform(1.7, 1.95) * brisk**0.5)
     gait = Gait(
         follow_s=0.17,
