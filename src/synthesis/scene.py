@@ -15,11 +15,12 @@ from kintrack.body import run_kinematics
 from kintrack.errors import SceneError
 from synthesis.barrier import barrier
 from synthesis.mesh import Mesh, join
-from synthesis.motions.actions import ACTIONS, GRIPPING_ACTIONS, SHORTEST_S, act
+from synthesis.motions.actions import ACTIONS, GRIPPING_ACTIONS, SHORTEST_S, act, default_things
 from synthesis.motions.mocap import excerpt, load_clip
 from synthesis.motions.motion import RATE_HZ, Motion
 from synthesis.motions.performance import Performance, Prop
 from synthesis.motions.retarget import retarget
+from synthesis.motions.roaming import roaming
 from synthesis.objects.catalogue import THINGS, held_out_things, training_things
 from synthesis.objects.rooms import room
 from synthesis.people.figure import Figure
@@ -97,6 +98,8 @@ def build_scene(take: Take, mocap: Path | None = None) -> Scene:
     around = THINGS if take.held_out_things else training_things()
     before = held_out_things() if take.held_out_things else training_things()
     performance = _perform(take, person, acting, mocap)
+    if take.roaming_arms:
+        performance = roaming(person, performance, acting, default_things())
     motion = performance.motion
     sensor = SENSORS[take.sensor]()
     joints = np.stack([run_kinematics(person.body, q).joint_positions_world for q in motion.q])

@@ -36,5 +36,7 @@ class Take:
     """Whether the camera drifts as a hand or a robot lets it."""
     truncated: bool = False
     """Whether the person may leave the image in part."""
+    roaming_arms: bool = False
+    """Whether the arms go anywhere instead of what the action does with them."""
     held_out_things: bool = False
     """Whether its objects are of the kinds that are never trained on."""

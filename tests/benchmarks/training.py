@@ -33,8 +33,10 @@ FOLDER = OUT / "training"
 PAPER_FRAMES, PAPER_PARTS = 120, ("paper/train", "paper/objects")
 FULL_FRAMES, QUICK_FRAMES = 19_000, 60
 """Of the recipe `training`: 1,900 recordings, half an hour on two cores."""
+ARMS_FRAMES, MORE_FRAMES = 11_000, 5_000
+"""Of the recipe `arms`, and of `training` with other draws, for the last leg of what ships."""
 STEPS = {"ship": 7_500, "compare": 20_000}
-"""Usual length of each training; `ship` takes 2.4 h on two cores, with what follows it."""
+"""Usual length of each training; `ship` takes 3.2 h on two cores, with what follows it."""
 BANK = ("--bank.cutouts", "3000", "--bank.rooms", "600")
 """Things and rooms to put into pictures, as many as for what ships."""
 WIDTHS = {
@@ -64,6 +66,10 @@ class Recipe(NamedTuple):
     """Channels per level; those of `WIDTHS` if empty."""
     start: str = ""
     """Run whose weights it begins with; random ones if empty."""
+    sets: tuple[str, ...] = ()
+    """Datasets below out/training; those that all share if empty."""
+    seed: int = 0
+    """Added to the seed of the command."""
 
 
 FIRST_LEG = Recipe(
@@ -74,11 +80,16 @@ FIRST_LEG = Recipe(
 )
 """A U-Net of half the usual width: as many weights as Fast-FCN, and a logit sees the whole person,
 which tells sides and things apart."""
-SECOND_LEG = FIRST_LEG._replace(name="ship_again", start=FIRST_LEG.name)
-"""What ships: the same once more from its weights, with other draws and a warm restart of the
-learning rate (Loshchilov & Hutter 2017) to half of its height."""
-SECOND_SHARE = 4_000 / STEPS["ship"]
-"""Length of that, share of the first training's."""
+SECOND_LEG = FIRST_LEG._replace(name="ship_again", start=FIRST_LEG.name, seed=1)
+"""The same once more from its weights, with other draws and a warm restart of the learning rate
+(Loshchilov & Hutter 2017) to half of its height."""
+THIRD_LEG = SECOND_LEG._replace(
+    name="ship_arms", start=SECOND_LEG.name, sets=("training_1", "arms"), seed=2
+)
+"""What ships: once more, on new takes whose arms mostly go anywhere. Authored arms know a few dozen
+postures, and those of motions that were held out were labelled far worse."""
+LATER_SHARE = 4_000 / STEPS["ship"]
+"""Length of either, share of the first training's."""
 COMPARED = (
     Recipe("fast_fcn", "fast_fcn"),
     Recipe("unet", "unet"),
@@ -99,10 +110,12 @@ def main() -> int:
         _build(folder, arguments.data, frames, arguments.quick)
     steps = 4 if arguments.quick else arguments.steps
     if arguments.what == "ship":
+        later = max(1, round(LATER_SHARE * steps))
         _train(folder, FIRST_LEG, steps, arguments)
-        print(
-            f"written: {_train(folder, SECOND_LEG, max(1, round(SECOND_SHARE * steps)), arguments)}"
-        )
+        _train(folder, SECOND_LEG, later, arguments)
+        if not arguments.sets:
+            _build_arms(folder, arguments.data, arguments.quick)
+        print(f"written: {_train(folder, THIRD_LEG, later, arguments)}")
         return 0
     files = {recipe.name: _train(folder, recipe, steps, arguments) for recipe in COMPARED}
     tables = [recipe.name for recipe in COMPARED[:4]]
@@ -154,18 +167,30 @@ def _build(folder: Path, data: Path, frames: int, quick: bool) -> None:
                   "--frames", str(PAPER_FRAMES))  # fmt: skip
 
 
+def _build_arms(folder: Path, data: Path, quick: bool) -> None:
+    """The sets of the last leg, or what is missing of them."""
+    for name, recipe, seed, frames in (
+        ("training_1", "training", 1, MORE_FRAMES),
+        ("arms", "arms", 0, ARMS_FRAMES),
+    ):
+        _kintrack(folder, "dataset", "build", name, "--recipe", recipe, "--seed", str(seed),
+                  "--mocap", str(data / "mocap"),
+                  "--frames", str(QUICK_FRAMES if quick else frames))  # fmt: skip
+
+
 def _train(folder: Path, recipe: Recipe, steps: int, arguments: argparse.Namespace) -> Path:
     """Weights of a run, which goes on where it was stopped."""
     path = folder / recipe.name / WEIGHTS_FILE
     usual = (QUICK_WIDTHS if arguments.quick else WIDTHS)[recipe.architecture]
     widths = usual if arguments.quick else recipe.widths or usual
-    sets = arguments.sets or ("training", *(() if arguments.quick else PAPER_PARTS))
+    shared = ("training", *(() if arguments.quick else PAPER_PARTS))
+    sets = arguments.sets or recipe.sets or shared
     if not path.is_file():
         bank = ("--bank.cutouts", "4", "--bank.rooms", "2") if arguments.quick else BANK
         threads = [] if arguments.processes == 1 else ["--threads", "1"]
-        rate, seed, start = arguments.rate, arguments.seed, []
+        rate, seed, start = arguments.rate, arguments.seed + recipe.seed, []
         if recipe.start:
-            rate, seed, start = 0.5 * rate, seed + 1, ["--start", f"{recipe.start}/{WEIGHTS_FILE}"]
+            rate, start = 0.5 * rate, ["--start", f"{recipe.start}/{WEIGHTS_FILE}"]
         _kintrack(
             folder, "train", *sets, "-o", recipe.name, "--cache", "cache",
             "--batch", str(arguments.batch), "--rate", str(rate), "--seed", str(seed),

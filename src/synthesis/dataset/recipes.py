@@ -7,12 +7,13 @@ Held-out people, motions and objects never reach a part that is trained on.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from kintrack.errors import DatasetError
-from synthesis.motions.actions import HELD_OUT_ACTIONS, training_actions
+from synthesis.motions.actions import HELD_OUT_ACTIONS, HOLDING_ACTIONS, training_actions
 from synthesis.motions.mocap import HELD_OUT, clips_in, load_clip
 from synthesis.people.population import held_out_people, training_people
 from synthesis.takes import Take
@@ -46,6 +47,8 @@ TRAINING_SENSORS = {
 """Share of each sensor."""
 TRAINING_CLIPS = 0.15
 """Share of takes with motion capture, if there is any."""
+ARMS_CLIPS = 0.3
+"""The same for `arms`; legs and trunks of real people, then, twice as often."""
 BENCH_FRAMES, BENCH_ACTIONS = 120, 8
 """Length and number of motions of the bench."""
 
@@ -98,20 +101,46 @@ def training(seed: int, mocap: Path | None, frames: int | None = None) -> tuple[
         mocap: Folder of motion capture clips; authored motions only if None.
         frames: Frames altogether, rounded up to whole takes; `TRAINING_TOTAL` if None.
     """
+    return _short_takes((seed, 2), seed, 3, mocap, frames, training_actions(), TRAINING_CLIPS)
+
+
+def arms(seed: int, mocap: Path | None, frames: int | None = None) -> tuple[Take, ...]:
+    """As `training`, but arms go anywhere (`synthesis.motions.roaming`).
+
+    Args:
+        seed: Draws all.
+        mocap: Folder of motion capture clips; authored motions only if None.
+        frames: Frames altogether, rounded up to whole takes; `TRAINING_TOTAL` if None.
+    """
+    empty = tuple(name for name in training_actions() if name not in HOLDING_ACTIONS)
+    takes = _short_takes((seed, 6), seed, 7, mocap, frames, empty, ARMS_CLIPS)
+    return tuple(replace(take, roaming_arms=True) for take in takes)
+
+
+def _short_takes(
+    draws: tuple[int, int],
+    seed: int,
+    stream: int,
+    mocap: Path | None,
+    frames: int | None,
+    actions: tuple[str, ...],
+    clips_share: float,
+) -> tuple[Take, ...]:
+    """Takes for training: another person, action, sensor and room each."""
     total = TRAINING_TOTAL if frames is None else frames
-    rng = np.random.default_rng((seed, 2))
+    rng = np.random.default_rng(draws)
     clips = training_clips(mocap, TRAINING_FRAMES * TRAINING_STRIDE)
     sensors, shares = list(TRAINING_SENSORS), list(TRAINING_SENSORS.values())
     takes: list[Take] = []
     for n in range(-(-total // TRAINING_FRAMES)):
-        from_clip = bool(clips) and rng.random() < TRAINING_CLIPS
+        from_clip = bool(clips) and rng.random() < clips_share
         takes.append(
             Take(
                 name=f"{n:05d}",
                 part="train",
-                seed=(seed, 3, n),
+                seed=(seed, stream, n),
                 person=int(rng.choice(training_people())),
-                action=str(rng.choice(clips if from_clip else training_actions())),
+                action=str(rng.choice(clips if from_clip else actions)),
                 sensor=str(rng.choice(sensors, p=shares)),
                 frames=TRAINING_FRAMES,
                 stride=TRAINING_STRIDE,
@@ -157,7 +186,12 @@ def bench(seed: int, mocap: Path | None, frames: int | None = None) -> tuple[Tak
 
 Recipe = Callable[[int, Path | None, int | None], tuple[Take, ...]]
 
-RECIPES: dict[str, Recipe] = {"paper": paper, "training": training, "bench": bench}
+RECIPES: dict[str, Recipe] = {
+    "paper": paper,
+    "training": training,
+    "arms": arms,
+    "bench": bench,
+}
 """Every recipe by name."""
 
 

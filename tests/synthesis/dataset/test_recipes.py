@@ -5,7 +5,7 @@ import pytest
 from kintrack.errors import DatasetError
 from kintrack.joints import JOINT_NAMES
 from synthesis.dataset.recipes import RECIPES, held_out_clips, takes_of, training_clips
-from synthesis.motions.actions import HELD_OUT_ACTIONS
+from synthesis.motions.actions import HELD_OUT_ACTIONS, HOLDING_ACTIONS
 from synthesis.motions.mocap import HELD_OUT
 from synthesis.people.population import held_out_people, training_people
 
@@ -36,7 +36,7 @@ def test_the_papers_set_has_its_sizes():
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("recipe", ["paper", "training"])
+@pytest.mark.parametrize("recipe", ["paper", "training", "arms"])
 def test_nothing_held_out_is_trained_on(recipe, seed, mocap):
     for take in takes_of(recipe, seed, mocap):
         if take.part in ("train", "objects"):
@@ -72,6 +72,15 @@ def test_training_takes_differ_and_cover_every_sensor_and_motion(mocap):
     assert "cmu_01_01" in {take.action for take in takes}
 
 
+def test_arms_roam_in_takes_of_their_own_and_hold_nothing_of_the_actions(mocap):
+    takes = takes_of("arms", 0, mocap, 3_000)
+    assert all(take.roaming_arms for take in takes)
+    assert not {take.action for take in takes} & set(HOLDING_ACTIONS)
+    others = takes_of("training", 0, mocap, 3_000)
+    assert not any(take.roaming_arms for take in others)
+    assert {take.seed for take in takes}.isdisjoint(take.seed for take in others)
+
+
 def test_clips_shorter_than_a_take_are_left_out(mocap):
     assert training_clips(mocap, 100) == ["cmu_01_01"]
     assert held_out_clips(mocap, 100) == [HELD_OUT[0]]
@@ -85,7 +94,7 @@ def test_seeds_draw_other_takes_and_equal_seeds_the_same(recipe):
 
 
 def test_unknown_recipes_and_empty_lengths_are_refused():
-    with pytest.raises(DatasetError, match="paper, training, bench"):
+    with pytest.raises(DatasetError, match="paper, training, arms, bench"):
         takes_of("papre", 0, None)
     with pytest.raises(DatasetError, match="frames = 0"):
         takes_of("paper", 0, None, 0)

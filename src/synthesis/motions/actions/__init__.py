@@ -73,6 +73,17 @@ HELD_OUT_ACTIONS = ("guitar", "handing_over", "drinking")
 GRIPPING_ACTIONS = ("walking_with_suitcase", "drinking")
 """Actions whose hands should be drawn closed; `relaxed` hands suit the others."""
 
+HOLDING_ACTIONS = (
+    "phone",
+    "walking_with_suitcase",
+    "carrying_box",
+    "guitar",
+    "bending_and_lifting",
+    "handing_over",
+    "drinking",
+)
+"""Actions with something in the hands."""
+
 WALKING_ACTIONS = ("walking", "walking_with_suitcase", "carrying_box", "phone")
 """Actions that choose their own way over the floor, about the origin."""
 
@@ -137,6 +148,7 @@ __all__ = [
     "ACTIONS",
     "GRIPPING_ACTIONS",
     "HELD_OUT_ACTIONS",
+    "HOLDING_ACTIONS",
     "Action",
     "Things",
     "act",
