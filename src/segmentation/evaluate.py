@@ -99,10 +99,25 @@ def true_labels(frame: Frame) -> UInt8[ndarray, "106 128"]:
     if frame.labels is None or frame.depth_m is None:
         raise DatasetError(f"frame {frame.index} cannot be judged: {frame.problem or 'no labels'}")
     checked(frame, "labels to judge by")
-    height, width = frame.depth_m.shape
-    truth = np.full((INPUT_HEIGHT, INPUT_WIDTH), IGNORED, dtype=np.uint8)
-    _fill_shown(np.asarray(frame.depth_m), frame.labels, letterbox(width, height), truth)
-    return truth
+    return labels_shown(frame.depth_m, frame.labels)
+
+
+def labels_shown(
+    depth_m: Float[ndarray, "h w"], labels: UInt8[ndarray, "r c"]
+) -> UInt8[ndarray, "106 128"]:
+    """Labels of an image at the network's size: of the very readings that its cells show.
+
+    Args:
+        depth_m: Depth [m], 0 = no reading.
+        labels: Labels of the same image, at any size.
+
+    Returns:
+        The labels; background in a cell without reading, `IGNORED` in the bars.
+    """
+    height, width = depth_m.shape
+    shown = np.full((INPUT_HEIGHT, INPUT_WIDTH), IGNORED, dtype=np.uint8)
+    _fill_shown(np.asarray(depth_m), labels, letterbox(width, height), shown)
+    return shown
 
 
 def evaluate(

@@ -22,6 +22,8 @@ from segmentation.weights import Weights
 WEIGHT_LEVELS = 255
 """Int8 without -128, so that a range is symmetric."""
 ACTIVATION_LEVELS = 256
+BOTH_WAYS = 2
+"""A picture and its mirror image."""
 
 
 class Node(NamedTuple):
@@ -92,13 +94,13 @@ class GraphOperations:
 
 
 def openvino_model(weights: Weights, quantised: bool) -> ov.Model:
-    """The network as an OpenVINO model, (1, 4, 106, 128) to (1, 7, 106, 128), both float32.
+    """The network as an OpenVINO model, (2, 4, 106, 128) to (2, 7, 106, 128), both float32.
 
     Args:
         weights: Network, tensors and, for int8, ranges.
         quantised: Int8 inside, by the ranges of the weights file.
     """
-    shape = [1, len(INPUT_CHANNELS), INPUT_HEIGHT, INPUT_WIDTH]
+    shape = [BOTH_WAYS, len(INPUT_CHANNELS), INPUT_HEIGHT, INPUT_WIDTH]
     image = ops.parameter(shape, np.float32, "image")
     logits = draw(weights.config, GraphOperations(weights, quantised), Node(image.output(0), False))
     return ov.Model([logits.output], [image], weights.config.architecture)

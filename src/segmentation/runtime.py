@@ -19,12 +19,12 @@ from numpy import ndarray
 
 from kintrack.sequence.frame import Frame
 from segmentation.errors import InputError, RuntimeFallbackWarning, SegmentationError
-from segmentation.labels import INPUT_CHANNELS, INPUT_HEIGHT, INPUT_WIDTH, LABELS
+from segmentation.labels import INPUT_CHANNELS, INPUT_HEIGHT, INPUT_WIDTH, LABELS, MIRRORED
 from segmentation.preprocess import frame_input
 from segmentation.weights import Weights, load_weights
 
 Infer = Callable[[ndarray], ndarray]
-"""From a checked input (1, 4, 106, 128) to logits (7, 106, 128), both float32."""
+"""From pictures (2, 4, 106, 128) to logits (2, 7, 106, 128), both float32."""
 
 PRECISIONS = ("auto", "fp32", "bf16")
 DOUBT = 4.0
@@ -96,6 +96,9 @@ class NetworkSegmenter:
     def logits_of(self, image: Float[ndarray, "4 106 128"]) -> Float[ndarray, "7 106 128"]:
         """Logits of a network input that has been made before.
 
+        They are the mean of those of the picture and of its mirror image, left and right swapped
+        back: whose limb a pixel is depends less on the way a person happens to face.
+
         Raises:
             InputError: if its shape or type is wrong.
         """
@@ -103,7 +106,8 @@ class NetworkSegmenter:
         if image.shape != shape or image.dtype != np.float32:
             raise InputError(f"network input of shape {image.shape} and type {image.dtype}: "
                              f"{shape} in float32 is needed")  # fmt: skip
-        return self.infer(np.ascontiguousarray(image)[None])
+        straight, mirrored = self.infer(np.stack([image, image[:, :, ::-1]]))
+        return np.float32(0.5) * (straight + mirrored[MIRRORED, :, ::-1])
 
 
 def labels_of(logits: Float[ndarray, "7 106 128"]) -> UInt8[ndarray, "106 128"]:
@@ -226,7 +230,7 @@ def _openvino(weights: Weights, config: RuntimeConfig, quantised: bool) -> Infer
 
     def infer(image: ndarray) -> ndarray:
         request.infer({0: image}, share_inputs=True)
-        return request.get_output_tensor(0).data[0].copy()
+        return request.get_output_tensor(0).data
 
     return infer
 
@@ -274,7 +278,7 @@ def _torch(weights: Weights, config: RuntimeConfig, device: str) -> Infer:
     def infer(image: ndarray) -> ndarray:
         with torch.inference_mode():
             x = torch.from_numpy(image).to(device, dtype, memory_format=layout)
-            return network(x)[0].float().contiguous().cpu().numpy()
+            return network(x).float().contiguous().cpu().numpy()
 
     return infer
 

@@ -153,7 +153,9 @@ def _perform(
     """The take's action, as long as the take."""
     length = take.frames * take.stride
     if take.action in ACTIONS:
-        return act(take.action, person, rng, max(length / RATE_HZ, SHORTEST_S)).first(length)
+        things = default_things(take.on_sofa)
+        duration_s = max(length / RATE_HZ, SHORTEST_S)
+        return act(take.action, person, rng, duration_s, things).first(length)
     if mocap is None:
         raise SceneError(
             f"action {take.action!r}: none of {', '.join(ACTIONS)}; "

@@ -38,5 +38,7 @@ class Take:
     """Whether the person may leave the image in part."""
     roaming_arms: bool = False
     """Whether the arms go anywhere instead of what the action does with them."""
+    on_sofa: bool = False
+    """Whether who sits does so on a sofa or in an armchair; else on a stool or a chair."""
     held_out_things: bool = False
     """Whether its objects are of the kinds that are never trained on."""

@@ -29,6 +29,7 @@ from segmentation.errors import (  # noqa: E402
     WeightsError,
 )
 from segmentation.graph import openvino_model, precisions  # noqa: E402
+from segmentation.labels import MIRRORED  # noqa: E402
 from segmentation.runtime import (  # noqa: E402
     RuntimeConfig,
     labels_of,
@@ -239,6 +240,15 @@ def test_a_later_frame_does_not_overwrite_what_an_earlier_one_gave(slim):
     copy = first.copy()
     labeller.logits(frame(11))
     assert (first == copy).all()
+
+
+@pytest.mark.parametrize("name", ["torch", "openvino", "openvino-int8"])
+def test_the_mirror_image_gets_the_mirrored_labels(weights, name):
+    labeller = segmenter(weights, RuntimeConfig(name, "fp32"))
+    image = room_input(10)
+    straight, mirrored = labeller.logits_of(image), labeller.logits_of(image[:, :, ::-1])
+    assert np.abs(straight - mirrored[MIRRORED, :, ::-1]).max() < 1e-4 * np.abs(straight).max()
+    assert np.abs(straight - mirrored).max() > 0.1 * np.abs(straight).max()
 
 
 def test_labels_are_the_most_probable_ones():

@@ -23,11 +23,13 @@ class DatasetBuild:
     """Folder of the dataset."""
     recipe: str = "paper"
     """paper: 8 people, 32 clean recordings and 7 with objects, 300 frames; training: many short
-    takes; arms: the same with arms that go anywhere; bench: held-out people and motions."""
+    takes; arms: the same with arms that go anywhere; sofas: the same on sofas; bench: held-out
+    people and motions."""
     seed: int = 0
     """Draws everything; the same seed gives the same bytes."""
     frames: int | None = None
-    """Another length: of every recording, or of the whole set for `training` and `arms`."""
+    """Another length: of every recording, or of the whole set for `training`, `arms` and
+    `sofas`."""
     mocap: Path | None = None
     """Folder of motion capture clips; authored motions only if not given."""
     workers: int | None = None

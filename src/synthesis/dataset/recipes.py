@@ -13,7 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from kintrack.errors import DatasetError
-from synthesis.motions.actions import HELD_OUT_ACTIONS, HOLDING_ACTIONS, training_actions
+from synthesis.motions.actions import (
+    HELD_OUT_ACTIONS,
+    HOLDING_ACTIONS,
+    SITTING_ACTIONS,
+    training_actions,
+)
 from synthesis.motions.mocap import HELD_OUT, clips_in, load_clip
 from synthesis.people.population import held_out_people, training_people
 from synthesis.takes import Take
@@ -49,6 +54,8 @@ TRAINING_CLIPS = 0.15
 """Share of takes with motion capture, if there is any."""
 ARMS_CLIPS = 0.3
 """The same for `arms`; legs and trunks of real people, then, twice as often."""
+SOFAS_ROAMING, SOFAS_FACING = 0.4, 0.75
+"""Of takes on sofas, share with arms that go anywhere and share before the camera."""
 BENCH_FRAMES, BENCH_ACTIONS = 120, 8
 """Length and number of motions of the bench."""
 
@@ -115,6 +122,27 @@ def arms(seed: int, mocap: Path | None, frames: int | None = None) -> tuple[Take
     empty = tuple(name for name in training_actions() if name not in HOLDING_ACTIONS)
     takes = _short_takes((seed, 6), seed, 7, mocap, frames, empty, ARMS_CLIPS)
     return tuple(replace(take, roaming_arms=True) for take in takes)
+
+
+def sofas(seed: int, mocap: Path | None, frames: int | None = None) -> tuple[Take, ...]:
+    """As `training`, but everybody sits on a sofa or in an armchair, some with arms that roam.
+
+    Args:
+        seed: Draws all.
+        mocap: Not used.
+        frames: Frames altogether, rounded up to whole takes; `TRAINING_TOTAL` if None.
+    """
+    takes = _short_takes((seed, 8), seed, 9, None, frames, SITTING_ACTIONS, 0.0)
+    rng = np.random.default_rng((seed, 10))
+    return tuple(
+        replace(
+            take,
+            on_sofa=True,
+            roaming_arms=bool(rng.random() < SOFAS_ROAMING),
+            facing=bool(rng.random() < SOFAS_FACING),
+        )
+        for take in takes
+    )
 
 
 def _short_takes(
@@ -190,6 +218,7 @@ RECIPES: dict[str, Recipe] = {
     "paper": paper,
     "training": training,
     "arms": arms,
+    "sofas": sofas,
     "bench": bench,
 }
 """Every recipe by name."""

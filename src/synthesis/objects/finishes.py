@@ -66,9 +66,14 @@ def fabric(rng: Generator) -> Material:
 def leather(rng: Generator) -> Material:
     """Leather or imitation; black in half of the draws."""
     if rng.random() < 0.5:
-        return Material(grey(rng, 0.01, 0.04), rng.uniform(0.03, 0.12), 0.12)
+        return black_leather(rng)
     tone = np.array([0.35, 0.2, 0.11]) * rng.uniform(0.3, 1.8)
     return Material(Plain(_rgb(tone)), rng.uniform(0.2, 0.6), 0.1)
+
+
+def black_leather(rng: Generator) -> Material:
+    """Leather that swallows near-infrared light, too."""
+    return Material(grey(rng, 0.01, 0.04), rng.uniform(0.03, 0.12), 0.12)
 
 
 def upholstery(rng: Generator) -> Material:

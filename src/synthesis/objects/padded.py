@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
-from synthesis.mesh import join
+from synthesis.mesh import Material, join
 from synthesis.objects import finishes
 from synthesis.objects.bars import bent, pose, put, sheet, tube
 from synthesis.objects.shapes import box, cylinder
@@ -61,9 +61,9 @@ def desk_chair(rng: Generator) -> Thing:
     return Thing("desk_chair", join(parts), {"seat": pose((0, 0, seat - 0.005))})
 
 
-def sofa(rng: Generator) -> Thing:
-    """An armchair or a sofa of up to three seats, with loose cushions."""
-    cover = finishes.upholstery(rng)
+def sofa(rng: Generator, cover: Material | None = None) -> Thing:
+    """An armchair or a sofa of up to three seats, with loose cushions; of drawn stuff if None."""
+    cover = finishes.upholstery(rng) if cover is None else cover
     seats = int(rng.choice([1, 2, 3], p=[0.25, 0.4, 0.35]))
     arm, arm_height = rng.uniform(0.1, 0.24), rng.uniform(0.52, 0.66)
     each, depth = rng.uniform(0.55, 0.68), rng.uniform(0.8, 0.98)

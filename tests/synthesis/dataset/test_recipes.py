@@ -5,7 +5,7 @@ import pytest
 from kintrack.errors import DatasetError
 from kintrack.joints import JOINT_NAMES
 from synthesis.dataset.recipes import RECIPES, held_out_clips, takes_of, training_clips
-from synthesis.motions.actions import HELD_OUT_ACTIONS, HOLDING_ACTIONS
+from synthesis.motions.actions import HELD_OUT_ACTIONS, HOLDING_ACTIONS, SITTING_ACTIONS
 from synthesis.motions.mocap import HELD_OUT
 from synthesis.people.population import held_out_people, training_people
 
@@ -36,7 +36,7 @@ def test_the_papers_set_has_its_sizes():
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("recipe", ["paper", "training", "arms"])
+@pytest.mark.parametrize("recipe", ["paper", "training", "arms", "sofas"])
 def test_nothing_held_out_is_trained_on(recipe, seed, mocap):
     for take in takes_of(recipe, seed, mocap):
         if take.part in ("train", "objects"):
@@ -81,6 +81,13 @@ def test_arms_roam_in_takes_of_their_own_and_hold_nothing_of_the_actions(mocap):
     assert {take.seed for take in takes}.isdisjoint(take.seed for take in others)
 
 
+def test_everybody_sits_on_a_sofa_and_some_let_their_arms_roam():
+    takes = takes_of("sofas", 0, None, 2_000)
+    assert all(take.on_sofa and take.action in SITTING_ACTIONS for take in takes)
+    assert 0.25 < np.mean([take.roaming_arms for take in takes]) < 0.55
+    assert not any(take.on_sofa for take in takes_of("training", 0, None, 2_000))
+
+
 def test_clips_shorter_than_a_take_are_left_out(mocap):
     assert training_clips(mocap, 100) == ["cmu_01_01"]
     assert held_out_clips(mocap, 100) == [HELD_OUT[0]]
@@ -94,7 +101,7 @@ def test_seeds_draw_other_takes_and_equal_seeds_the_same(recipe):
 
 
 def test_unknown_recipes_and_empty_lengths_are_refused():
-    with pytest.raises(DatasetError, match="paper, training, arms, bench"):
+    with pytest.raises(DatasetError, match="paper, training, arms, sofas, bench"):
         takes_of("papre", 0, None)
     with pytest.raises(DatasetError, match="frames = 0"):
         takes_of("paper", 0, None, 0)

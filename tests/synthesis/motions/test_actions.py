@@ -11,6 +11,7 @@ from synthesis.motions.actions import (
     GRIPPING_ACTIONS,
     HELD_OUT_ACTIONS,
     act,
+    default_things,
     training_actions,
 )
 from synthesis.motions.actions.frames import pose
@@ -192,6 +193,22 @@ def test_who_sits_touches_the_seat(performed, name):
             assert abs(v[above, 2].min()) < 0.03
         if name == "sitting_down_and_rising":
             assert height[0] - height.min() > 0.2 and height[-1] - height.min() > 0.2
+
+
+def test_who_sits_on_a_sofa_rests_on_its_cushion_before_its_back(people):
+    for seed, person in enumerate(people):
+        things = default_things(on_sofa=True)
+        done = act("sitting_and_gesturing", person, np.random.default_rng(seed), DURATION_S, things)
+        (prop,) = done.props
+        assert prop.thing.name == "sofa"
+        T = prop.Ts_world_thing[0] @ prop.thing.places["seat"]
+        links = [person.skin.link_names.index(n) for n in ("pelvis", "l_thigh", "r_thigh")]
+        of = (person.skin.weights * np.isin(person.skin.links, links)).sum(axis=1) > 0.6
+        state = run_kinematics(person.body, done.motion.q[0])
+        v = (skinned_vertices(state, person.skin)[of] - T[:3, 3]) @ T[:3, :3]
+        rear = (prop.thing.mesh.vertices - prop.thing.places["seat"][:3, 3])[:, 0].min()
+        assert abs(v[np.abs(v[:, 0]) < 0.15, 2].min()) < 0.03
+        assert v[:, 0].min() > rear + 0.1
 
 
 @every_action

@@ -21,14 +21,13 @@ from kintrack.sequence.frame import Frame
 from kintrack.sequence.recording import Recording
 from kintrack.sequence.reference import read_reference_pixels
 from segmentation.errors import InputError
-from segmentation.evaluate import true_labels
-from segmentation.labels import BACKGROUND, IGNORED, INPUT_HEIGHT, INPUT_WIDTH
+from segmentation.evaluate import labels_shown, true_labels
+from segmentation.labels import BACKGROUND, IGNORED
 from segmentation.preprocess import (
     HOLE,
     frame_input,
     labels_to_image,
     labels_to_network,
-    letterbox,
 )
 from segmentation.runtime import NetworkSegmenter, labels_of
 from segmentation.tracking import ImageSegmenter, thinning
@@ -91,7 +90,8 @@ class Sample:
         if modality in (RGBD, DEPTH):
             frame = replace(self.frame, color=None) if bare else self.frame
             pixels = ImageSegmenter(network).segment(frame)[0]
-            return Labelled(_at_middles(pixels), pixels)
+            assert frame.depth_m is not None
+            return Labelled(labels_shown(frame.depth_m, pixels), pixels)
         image = self.image
         if bare:
             image = image.copy()
@@ -137,21 +137,6 @@ def _sample(
     if truth is None and mask is None and not seen:
         return None
     return Sample(number, image, frame, truth, _of_pixels(known), mask, seen)
-
-
-def _at_middles(labels: UInt8[ndarray, "r c"]) -> UInt8[ndarray, "106 128"]:
-    """The label in the middle of every cell.
-
-    No vote: of labels of every second pixel a cell has four, and a vote would need a rule for draws
-    that favours somebody.
-    """
-    fit = letterbox(labels.shape[1], labels.shape[0])
-    out = np.full((INPUT_HEIGHT, INPUT_WIDTH), IGNORED, dtype=np.uint8)
-    rows = (2 * np.arange(fit.rows) + 1) * fit.height // (2 * fit.rows)
-    columns = (2 * np.arange(fit.columns) + 1) * fit.width // (2 * fit.columns)
-    inside = out[fit.top : fit.top + fit.rows, fit.left : fit.left + fit.columns]
-    inside[:] = labels[rows].take(columns, axis=1)
-    return out
 
 
 def _of_pixels(known: Frame | None) -> UInt8[ndarray, "r c"] | None:

@@ -31,7 +31,7 @@ from synthesis.people.person import Person
 
 Things = Mapping[str, Callable[[np.random.Generator], Thing]]
 """Draws a thing of a kind: `suitcase`, `trolley`, `box`, `guitar`, `cup`, `bottle`, `phone`,
-`stool`, `chair`. `trolley` and `bottle` may be missing, and one of `stool` and `chair`."""
+`stool`, `chair`, `sofa`. `trolley` and `bottle` may be missing, and all seats but one."""
 
 
 class Action(Protocol):
@@ -84,8 +84,14 @@ HOLDING_ACTIONS = (
 )
 """Actions with something in the hands."""
 
+SITTING_ACTIONS = ("sitting_down_and_rising", "sitting_and_gesturing")
+"""Actions on a seat, which hold nothing."""
+
 WALKING_ACTIONS = ("walking", "walking_with_suitcase", "carrying_box", "phone")
 """Actions that choose their own way over the floor, about the origin."""
+
+BLACK = 0.5
+"""Share of sofas of black leather that people sit on."""
 
 SHORTEST_S = 3.0
 """Shortest performance [s]: less than that is no whole movement."""
@@ -99,13 +105,26 @@ def training_actions() -> tuple[str, ...]:
     return tuple(name for name in ACTIONS if name not in HELD_OUT_ACTIONS)
 
 
-def default_things() -> Things:
-    """The things of `synthesis.objects` that people carry and sit on."""
+def default_things(on_sofa: bool = False) -> Things:
+    """The things of `synthesis.objects` that people carry and sit on.
+
+    Args:
+        on_sofa: Whether the only seats are sofas and armchairs; stools and chairs if not.
+    """
     from synthesis.objects import carried, seats
 
     names = ("suitcase", "trolley", "box", "guitar", "cup", "bottle", "phone")
     kinds = {name: getattr(carried, name) for name in names if hasattr(carried, name)}
+    if on_sofa:
+        return {**kinds, "sofa": _sofa}
     return {**kinds, "stool": seats.stool, "chair": seats.chair}
+
+
+def _sofa(rng: np.random.Generator) -> Thing:
+    """Of black leather every second time, whose depth most sensors lose."""
+    from synthesis.objects import finishes, seats
+
+    return seats.sofa(rng, finishes.black_leather(rng) if rng.random() < BLACK else None)
 
 
 def act(
@@ -149,6 +168,7 @@ __all__ = [
     "GRIPPING_ACTIONS",
     "HELD_OUT_ACTIONS",
     "HOLDING_ACTIONS",
+    "SITTING_ACTIONS",
     "Action",
     "Things",
     "act",

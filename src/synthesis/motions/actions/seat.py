@@ -23,6 +23,8 @@ from synthesis.motions.poses import still
 from synthesis.objects.thing import Thing
 from synthesis.people.person import SIDES, Person
 
+SEATS = ("stool", "chair", "sofa")
+"""What people sit down on."""
 PRESSED_M = 0.010
 """How deep flesh and cushion give way [m]."""
 ROUNDS = 6
@@ -54,20 +56,18 @@ class Seated:
 
 
 def draw_seated(person: Person, rng: np.random.Generator, mood: Mood, things: Mapping) -> Seated:
-    """Draw a stool or a chair and a way to sit on it.
+    """Draw a seat and a way to sit on it.
 
     Args:
         person: Who sits.
         rng: Draws.
         mood: Their posture, which moves the skin a little.
-        things: Kinds of things; `stool` or `chair` is drawn.
+        things: Kinds of things; one of those of `SEATS` is drawn.
 
     Returns:
         The way; the lowest skin above the seat is `PRESSED_M` below its surface.
     """
-    seat = draw_thing(
-        things, pick(rng, *(name for name in ("stool", "chair") if name in things)), rng
-    )
+    seat = draw_thing(things, pick(rng, *(name for name in SEATS if name in things)), rng)
     height = float(place_of(seat, "seat")[2, 3])
     leg_m = leg_length(person.body)
     hip, knee = (neutral_position(person, f"l_{name}") for name in ("thigh", "shank"))
