@@ -6,8 +6,9 @@ import pytest
 from training_data import CAMERA, figure
 
 from kintrack.errors import DatasetError
+from kintrack.geometry import PinholeCamera
 from kintrack.sequence.frame import Frame
-from segmentation.evaluate import confusion, evaluate, iou_of, scores_of, true_labels
+from segmentation.evaluate import confusion, evaluate, iou_of, labels_shown, scores_of, true_labels
 from segmentation.labels import IGNORED
 from segmentation.preprocess import (
     DEPTH_SCALE,
@@ -91,6 +92,18 @@ def test_truth_is_the_label_of_the_reading_that_a_cell_of_the_input_shows(monkey
     taken = nearby[off.argmin(axis=0), np.arange(len(shown_m))]
     assert read.sum() > 5000 and (truth[~read] % IGNORED == 0).all()
     assert (labels.reshape(-1)[taken] == truth[read]).mean() > 0.99
+
+
+def test_right_labels_of_every_second_pixel_score_nearly_one():
+    depth, _, labels = (np.repeat(np.repeat(plane, 4, 0), 4, 1) for plane in figure(0))
+    rng = np.random.default_rng(0)
+    depth = (depth + 1e-3 * rng.random(depth.shape)).astype(np.float32)
+    camera = PinholeCamera(*(4 * v for v in (CAMERA.width, CAMERA.height, CAMERA.fx, CAMERA.fy,
+                                             CAMERA.cx, CAMERA.cy)))  # fmt: skip
+    truth = true_labels(Frame(0, 0.0, camera, depth, labels=labels))
+    thinned = np.ascontiguousarray(labels[::2, ::2])
+    scores = scores_of(confusion(truth, labels_shown(depth, thinned)))
+    assert scores.non_background_iou > 0.97
 
 
 def test_recordings_without_labels_cannot_be_evaluated():
