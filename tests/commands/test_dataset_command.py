@@ -29,7 +29,7 @@ def test_a_dataset_says_its_size_is_built_and_looked_at(tmp_path, capsys):
 @pytest.mark.parametrize(
     "options, says",
     [
-        (["--recipe", "papre"], "paper, training, bench"),
+        (["--recipe", "papre"], "paper, training, arms, sofas, bench"),
         (["--frames", "0"], "at least 1"),
         (["--mocap", "nowhere"], "nowhere"),
     ],
