@@ -40,7 +40,8 @@ LATER_SETS = {
 }
 """Sets of the last leg of what ships: recipe, seed, frames."""
 STEPS = {"ship": 7_500, "compare": 20_000}
-"""Usual length of each training; `ship` takes 3.2 h on two cores, with what follows it."""
+"""Usual length of each training; `ship` takes 4.3 h on two cores, filming and what follows it
+included."""
 BANK = ("--bank.cutouts", "3000", "--bank.rooms", "600")
 """Things and rooms to put into pictures, as many as for what ships."""
 WIDTHS = {

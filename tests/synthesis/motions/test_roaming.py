@@ -13,6 +13,7 @@ from synthesis.people.person import load_person
 
 ACTIONS, PEOPLE = ("walking", "sitting_and_gesturing", "squatting"), (3, 250, 77)
 DURATION_S = 3.4
+ARM_LINKS = ("_clavicle", "_upper_arm", "_forearm", "_forearm_distal", "_hand")
 
 
 def performed(n):
@@ -63,9 +64,6 @@ def test_hands_and_forearms_do_not_go_through_trunk_head_or_legs(roamed):
             _, nearest = cKDTree(skin[rest]).query(skin[hand])
             outside = ((skin[hand] - skin[rest][nearest]) * normals[nearest]).sum(axis=1)
             assert outside.min() > -0.02
-
-
-ARM_LINKS = ("_clavicle", "_upper_arm", "_forearm", "_forearm_distal", "_hand")
 
 
 def test_hands_come_to_places_all_round():
