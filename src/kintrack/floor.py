@@ -85,11 +85,9 @@ class Ground:
             now_s: Now [s].
             config: How near the lower foot must be.
         """
-        found = find_floor(observation, T_world_camera, config.tilt_deg)
+        found = floor_under(observation, T_world_camera, soles_world, config)
         if found is not None:
-            lowest = min(float(found.above_m(sole).mean()) for sole in soles_world)
-            if abs(lowest) < config.stands_m:
-                return Ground(found, now_s, now_s)
+            return Ground(found, now_s, now_s)
         kept = self.floor if 0.0 <= now_s - self.found_s < config.kept_s else None
         return replace(self, floor=kept, looked_s=now_s)
 
@@ -105,6 +103,27 @@ def soles_of(human: Human) -> Int[ndarray, "2 4"]:
         along = own[np.argsort(vertices[own, 0], kind="stable")]
         soles.append(along[[0, 1, -2, -1]])
     return np.array(soles)
+
+
+def floor_under(
+    observation: Observation,
+    T_world_camera: Float[ndarray, "4 4"],
+    soles_world: Float[ndarray, "2 s 3"],
+    config: FloorConfig,
+) -> Floor | None:
+    """The floor of a frame, if the lower foot of a body stands on it.
+
+    Args:
+        observation: Labelled points.
+        T_world_camera: Camera pose.
+        soles_world: Both soles of the body [m].
+        config: How near the lower foot must be.
+    """
+    floor = find_floor(observation, T_world_camera, config.tilt_deg)
+    if floor is None:
+        return None
+    lowest = min(float(floor.above_m(sole).mean()) for sole in soles_world)
+    return floor if abs(lowest) < config.stands_m else None
 
 
 def find_floor(

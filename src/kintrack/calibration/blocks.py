@@ -19,6 +19,7 @@ from kintrack.calibration.config import BundleConfig
 from kintrack.config import TrackerConfig
 from kintrack.geometry import invert_rigid, transform_points, tukey_weights
 from kintrack.human import Human
+from kintrack.residuals.contact import Contact, contact_residual
 from kintrack.residuals.prior import TangentPrior
 from kintrack.residuals.surface import SurfaceResidual, silhouette_residual, surface_residual
 from kintrack.shape import ShapeSpace, vertex_shape_jacobians
@@ -35,6 +36,8 @@ class Snapshot:
     """Pose."""
     T_world_camera: Float[ndarray, "4 4"]
     """Camera pose."""
+    contact: Contact | None = None
+    """The floor and both soles, one of which stands on it; None where no floor is known."""
 
 
 @dataclass(frozen=True)
@@ -171,12 +174,16 @@ def surface_of(
             silhouette_weight=config.silhouette_weight,
         ),
     )
-    return replace(
+    surface = replace(
         surface,
         weights=robust / (config.correlation * sigma**2),
         inliers=int(inlier.sum()),
         rms_m=float(np.sqrt(np.mean(plane[inlier] ** 2))) if inlier.any() else float("nan"),
     ).joined(outline)
+    if snapshot.contact is None:
+        return surface
+    lower = snapshot.contact.lower(vertices)
+    return surface.joined(contact_residual(human.skin, lower, vertices, config.floor))
 
 
 @njit(cache=True, nogil=True)

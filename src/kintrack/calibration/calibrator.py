@@ -15,7 +15,7 @@ from numpy import ndarray
 from threadpoolctl import threadpool_limits
 
 from kintrack.association.observation import Observation
-from kintrack.body import run_kinematics
+from kintrack.body import BodyState, run_kinematics
 from kintrack.calibration.blocks import Snapshot
 from kintrack.calibration.bundle import Bundle, Gaussian, Measurement, solve_bundle
 from kintrack.calibration.config import CalibrationConfig
@@ -27,9 +27,12 @@ from kintrack.calibration.verdict import LIMITS, Limits, problems_of
 from kintrack.clothing import REGIONS, THICKEST_M, dressed_space, fold_sigma
 from kintrack.config import TrackerConfig
 from kintrack.errors import AssociationError
+from kintrack.floor import floor_under, soles_of
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, invert_rigid, transform_points
 from kintrack.human import Human
+from kintrack.residuals.contact import Contact
 from kintrack.shape import checked_shape, load_shape_space
+from kintrack.skin import skinned_vertices
 
 LEADING = 0.01
 """A coefficient that explains more of the population than this must stay within its bounds; the
@@ -93,6 +96,7 @@ class Calibrator:
         self.tracker = TrackerConfig() if tracker is None else tracker
         self.stated_height_m = stated_height_m
         self.candidates: list[Candidate] = []
+        self._soles = soles_of(human)
 
     def add(self, index: int, observation: Observation, q: ndarray, seen: float = 1.0) -> None:
         """Take a frame.
@@ -105,11 +109,18 @@ class Calibrator:
         """
         state = run_kinematics(self.human.body, q)
         joints = transform_points(invert_rigid(self.T_world_camera), state.joint_positions_world)
-        snapshot = Snapshot(observation, np.array(q), self.T_world_camera)
+        contact = self._contact(observation, state)
+        snapshot = Snapshot(observation, np.array(q), self.T_world_camera, contact)
         self.candidates.append(Candidate(index, snapshot, joints, seen))
         if len(self.candidates) > self.config.pool:
             kept = self._varied(self.config.pool - self.config.pool // 4)
             self.candidates = [self.candidates[i] for i in kept]
+
+    def _contact(self, observation: Observation, state: BodyState) -> Contact | None:
+        """The floor under a body, and its soles."""
+        soles = skinned_vertices(state, self.human.skin)[self._soles]
+        floor = floor_under(observation, self.T_world_camera, soles, self.tracker.floor)
+        return None if floor is None else Contact(floor, self._soles)
 
     def result(self, limits: Limits = LIMITS) -> Person:
         """The person, or the template with the reasons why.

@@ -22,7 +22,16 @@ class Contact:
     floor: Floor
     """The floor."""
     soles: Int[ndarray, "f s"]
-    """Vertices under each foot that is not seen."""
+    """Vertices under each of these feet."""
+
+    def lower(self, vertices_world: Float[ndarray, "v 3"]) -> Contact:
+        """The same of the lowest foot alone.
+
+        Args:
+            vertices_world: All vertices [m].
+        """
+        above = self.floor.above_m(vertices_world[self.soles.ravel()]).reshape(self.soles.shape)
+        return Contact(self.floor, self.soles[[int(above.mean(axis=1).argmin())]])
 
 
 def contact_residual(
