@@ -127,11 +127,11 @@ class Memory:
         return view_skin(self._fitted, state, T_camera_world, observation, self.config)
 
     def _contact(self, lost: Bool[ndarray, " nv"]) -> Contact | None:
-        """The floor under feet of which nothing is seen; None if there is no such foot or floor."""
-        ankles = [self._met.body.dof(f"{side}_ankle_dorsiflexion") for side in "lr"]
-        if self._ground.floor is None or not lost[ankles].any():
+        """The floor, on which feet of which nothing is seen stand; None if there is none."""
+        if self._ground.floor is None:
             return None
-        return Contact(self._ground.floor, self._soles[lost[ankles]])
+        ankles = [self._met.body.dof(f"{side}_ankle_dorsiflexion") for side in "lr"]
+        return Contact(self._ground.floor, self._soles, lost[ankles])
 
     def _stance(self, state: BodyState) -> Float[ndarray, " 3"]:
         """How a body's pelvis is tilted, and how high it is if there is a floor."""

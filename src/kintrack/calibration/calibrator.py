@@ -120,7 +120,7 @@ class Calibrator:
         """The floor under a body, and its soles."""
         soles = skinned_vertices(state, self.human.skin)[self._soles]
         floor = floor_under(observation, self.T_world_camera, soles, self.tracker.floor)
-        return None if floor is None else Contact(floor, self._soles)
+        return None if floor is None else Contact(floor, self._soles, np.ones(2, dtype=bool))
 
     def result(self, limits: Limits = LIMITS) -> Person:
         """The person, or the template with the reasons why.

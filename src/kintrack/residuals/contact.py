@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from kintrack.floor import Floor
@@ -23,6 +23,8 @@ class Contact:
     """The floor."""
     soles: Int[ndarray, "f s"]
     """Vertices under each of these feet."""
+    stands: Bool[ndarray, " f"]
+    """Whether a foot is drawn to the floor, too, not only kept from going through it."""
 
     def lower(self, vertices_world: Float[ndarray, "v 3"]) -> Contact:
         """The same of the lowest foot alone.
@@ -31,7 +33,7 @@ class Contact:
             vertices_world: All vertices [m].
         """
         above = self.floor.above_m(vertices_world[self.soles.ravel()]).reshape(self.soles.shape)
-        return Contact(self.floor, self.soles[[int(above.mean(axis=1).argmin())]])
+        return Contact(self.floor, self.soles[[int(above.mean(axis=1).argmin())]], np.ones(1, bool))
 
 
 def contact_residual(
@@ -51,9 +53,10 @@ def contact_residual(
     Returns:
         The term.
     """
-    vertex = contact.soles.ravel()
+    above = contact.floor.above_m(vertices_world[contact.soles.ravel()])
+    counts = np.repeat(contact.stands, contact.soles.shape[1]) | (above < 0)
+    vertex, above = contact.soles.ravel()[counts], above[counts]
     points = vertices_world[vertex]
-    above = contact.floor.above_m(points)
     normal = contact.floor.normal
     sigma = np.where(above < 0, config.below_m, config.above_m)
     robust = np.minimum(1.0, config.far_m / np.maximum(np.abs(above), 1e-9))
