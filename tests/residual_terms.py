@@ -4,7 +4,7 @@
 import numpy as np
 
 from kintrack.floor import Floor, soles_of
-from kintrack.floor_config import FloorConfig
+from kintrack.floor_config import ContactConfig
 from kintrack.human import RESTING_DEG, posed, prior_sigma
 from kintrack.objective_config import PriorConfig, SurfaceConfig
 from kintrack.residuals.contact import Contact, contact_residual
@@ -35,7 +35,9 @@ def contact(human, state, rng):
     vertices, soles = skinned_vertices(state, human.skin), soles_of(human)
     up = np.array([0.05, -0.03, 1.0]) / np.linalg.norm([0.05, -0.03, 1.0])
     floor = Floor(up, float(vertices[soles[0, 0]] @ up))
-    return contact_residual(human.skin, Contact(floor, soles), vertices, FloorConfig())
+    return contact_residual(
+        human.skin, Contact(floor, soles, np.ones(2, dtype=bool)), vertices, ContactConfig()
+    )
 
 
 def leg_prior(human, state, rng):

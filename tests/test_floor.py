@@ -16,6 +16,7 @@ from kintrack.tracker import Tracker
 from labelled_people import board, labelled
 
 CONFIG = FloorConfig()
+BOTH = np.ones(2, dtype=bool)
 
 
 def plane(scene, height_m, tilt_deg=0.0, until_m=5.0):
@@ -105,12 +106,16 @@ def test_feet_come_to_the_floor_the_sooner_if_they_are_below_it(scene, off_m):
     state = run_kinematics(body, scene.place({"knee_flexion": 40, "hip_flexion": 30}))
     heights = skinned_vertices(state, skin)[soles][..., 2]
     floor = Floor(np.array([0.0, 0.0, 1.0]), float(heights.mean() - off_m))
-    term = contact_residual(skin, Contact(floor, soles), skinned_vertices(state, skin), CONFIG)
+    term = contact_residual(
+        skin, Contact(floor, soles, BOTH), skinned_vertices(state, skin), CONFIG.contact
+    )
     solution = solve(body, state, [term], 30, 1e-3)
     after = floor.above_m(skinned_vertices(solution.state, skin)[soles].reshape(-1, 3))
     assert np.abs(after).max() < 0.5 * abs(off_m)
     sunk = Floor(floor.normal, float(heights.mean() + abs(off_m)))
-    below = contact_residual(skin, Contact(sunk, soles), skinned_vertices(state, skin), CONFIG)
+    below = contact_residual(
+        skin, Contact(sunk, soles, BOTH), skinned_vertices(state, skin), CONFIG.contact
+    )
     assert off_m < 0 or below.cost(state) > 4 * term.cost(state)
 
 

@@ -148,7 +148,9 @@ def fit_pose(
         )
         data = surface.joined(outside)
         if contact is not None:
-            data = data.joined(contact_residual(human.skin, contact, vertices_world, config.floor))
+            data = data.joined(
+                contact_residual(human.skin, contact, vertices_world, config.floor.contact)
+            )
         view = None
         before = state.joint_positions_world
         solution = SOLVERS[config.solver.method](

@@ -216,7 +216,7 @@ class TrackerConfig:
     pull: PullConfig = field(default_factory=PullConfig)
     """Places of the parts."""
     floor: FloorConfig = field(default_factory=FloorConfig)
-    """Feet that are not seen."""
+    """Feet on the floor."""
     prior: PriorConfig = field(default_factory=PriorConfig)
     """Pose prior."""
     motion: MotionConfig = field(default_factory=MotionConfig)

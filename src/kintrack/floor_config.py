@@ -3,14 +3,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from kintrack.bounds import check_bounds
 
 
 @dataclass(frozen=True)
+class ContactConfig:
+    """How the floor holds a sole."""
+
+    below_m: float = 0.02
+    """Standard deviation of a sole below the floor [m]."""
+    above_m: float = 0.06
+    """And of one that stands, above it, where it may step [m]."""
+    far_m: float = 0.12
+    """A sole further off is drawn no harder than at this distance [m]."""
+
+    def __post_init__(self) -> None:
+        check_bounds(self, below_m=(1e-3, 1e6), above_m=(1e-3, 1e6), far_m=(1e-3, 10.0))
+
+
+@dataclass(frozen=True)
 class FloorConfig:
-    """Where the floor is and how it holds feet that are not seen; only in labelled rooms."""
+    """Where the floor is and how it holds feet; only in labelled rooms."""
 
     every_s: float = 0.5
     """Time between looks at the floor [s]."""
@@ -20,12 +35,8 @@ class FloorConfig:
     """How far the camera's pitch and roll may differ from what is stated [deg]."""
     stands_m: float = 0.15
     """The lower foot must be this near to a plane for it to be the floor [m]."""
-    below_m: float = 0.02
-    """Standard deviation of an unseen sole below the floor [m]."""
-    above_m: float = 0.06
-    """And above it, where it may step [m]."""
-    far_m: float = 0.12
-    """A sole further off is drawn no harder than at this distance [m]."""
+    contact: ContactConfig = field(default_factory=ContactConfig)
+    """How it holds feet while tracking: those that are not seen stand on it, others are above."""
 
     def __post_init__(self) -> None:
         check_bounds(
@@ -34,7 +45,4 @@ class FloorConfig:
             kept_s=(0.0, 1e6),
             tilt_deg=(0.0, 60.0),
             stands_m=(0.0, 10.0),
-            below_m=(1e-3, 1e6),
-            above_m=(1e-3, 1e6),
-            far_m=(1e-3, 10.0),
         )

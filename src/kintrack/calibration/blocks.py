@@ -183,7 +183,7 @@ def surface_of(
     if snapshot.contact is None:
         return surface
     lower = snapshot.contact.lower(vertices)
-    return surface.joined(contact_residual(human.skin, lower, vertices, config.floor))
+    return surface.joined(contact_residual(human.skin, lower, vertices, config.contact))
 
 
 @njit(cache=True, nogil=True)

@@ -3,10 +3,11 @@
 
 With d_i = s_i(q_f, b) - p_i for the pairs of frame f, the cost is the surface term of
 `kintrack.residuals.surface` over all frames, its scale the folds' (`kintrack.clothing`), plus
-pose priors, plus 0.5 |(b - mean) / sigma|^2 over shape and clothes. Its Gauss-Newton matrix is an
-arrow: one block per pose, bordered by the shape. The poses are eliminated (Schur complement), the
-shape is solved within its bounds, and each pose follows within its hinge limits [Triggs et al.,
-Bundle adjustment, 1999, section 6.1].
+pose priors, plus the floor under the lower foot (`kintrack.residuals.contact`), plus
+0.5 |(b - mean) / sigma|^2 over shape and clothes. Its Gauss-Newton matrix is an arrow: one block
+per pose, bordered by the shape. The poses are eliminated (Schur complement), the shape is solved
+within its bounds, and each pose follows within its hinge limits [Triggs et al., Bundle adjustment,
+1999, section 6.1].
 
 The pairs say less than their number suggests, by a factor c = inflation (rms / usual_rms)^4: with
 H_seen the matrix of all frames, poses eliminated, and H_known that of prior and measurements, the

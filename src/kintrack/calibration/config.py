@@ -9,7 +9,7 @@ from typing import Literal
 from kintrack.bounds import check_bounds
 from kintrack.calibration.errors import CalibrationError
 from kintrack.config import TrackerConfig
-from kintrack.floor_config import FloorConfig
+from kintrack.floor_config import ContactConfig
 
 BodyKind = Literal["template", "calibrated", "deformable"]
 """template: the average adult in average clothes, stature and build sized at the start; calibrated:
@@ -51,7 +51,7 @@ class BundleConfig:
     """Levenberg damping, relative to the diagonal."""
     tolerance: float = 0.01
     """Stop when no coefficient moves by more of its standard deviation."""
-    floor: FloorConfig = field(default_factory=lambda: FloorConfig(below_m=0.015, above_m=0.02))
+    contact: ContactConfig = field(default_factory=lambda: ContactConfig(0.015, 0.02))
     """How the lower foot stands on the floor, where there is one."""
 
 

@@ -30,10 +30,10 @@ class Limits(NamedTuple):
 
 LIMITS = Limits()
 """Somebody who is named: measured once, and known from then on."""
-ROUGH = Limits(least_spread_m=0.0, height_sigma_m=0.07, limb_share=0.11)
-"""Somebody who is only tracked: an estimate in doubt is nearer to her than the template. Training
-people in wide clothes are known to 5 to 6.5 cm; somebody of whom hardly more than the trunk is
-seen, to 10."""
+ROUGH = Limits(least_spread_m=0.0, height_sigma_m=0.10, limb_share=0.14)
+"""Somebody who is only tracked: an estimate in doubt is nearer to her than the template, and the
+floor below her feet holds it. Training people in wide clothes are known to 5 to 6.5 cm; somebody of
+whom hardly more than the trunk is seen, to 10."""
 
 
 def problems_of(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Feet that are not seen stand on the floor: below it hardly ever, above it while they step."""
+"""Feet on the floor: below it hardly ever, whatever is seen of them, above it while they step."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from kintrack.floor import Floor
-from kintrack.floor_config import FloorConfig
+from kintrack.floor_config import ContactConfig
 from kintrack.residuals.surface import SurfaceResidual, plane_roots
 from kintrack.skin import Skin
 
@@ -37,7 +37,7 @@ class Contact:
 
 
 def contact_residual(
-    skin: Skin, contact: Contact, vertices_world: Float[ndarray, "v 3"], config: FloorConfig
+    skin: Skin, contact: Contact, vertices_world: Float[ndarray, "v 3"], config: ContactConfig
 ) -> SurfaceResidual:
     """Pairs of soles with the floor below or above them, along its normal, Huber weights frozen.
 
