@@ -6,7 +6,7 @@ import pytest
 
 from kintrack.body import run_kinematics
 from kintrack.floor import Floor, Ground, find_floor, soles_of
-from kintrack.floor_config import FloorConfig
+from kintrack.floor_config import ContactConfig, FloorConfig
 from kintrack.geometry import T_LEVEL_WORLD_CAMERA, camera_pose
 from kintrack.joints import JOINT_NAMES
 from kintrack.residuals.contact import Contact, contact_residual
@@ -107,14 +107,14 @@ def test_feet_come_to_the_floor_the_sooner_if_they_are_below_it(scene, off_m):
     heights = skinned_vertices(state, skin)[soles][..., 2]
     floor = Floor(np.array([0.0, 0.0, 1.0]), float(heights.mean() - off_m))
     term = contact_residual(
-        skin, Contact(floor, soles, BOTH), skinned_vertices(state, skin), CONFIG.contact
+        skin, Contact(floor, soles, BOTH), skinned_vertices(state, skin), ContactConfig()
     )
     solution = solve(body, state, [term], 30, 1e-3)
     after = floor.above_m(skinned_vertices(solution.state, skin)[soles].reshape(-1, 3))
     assert np.abs(after).max() < 0.5 * abs(off_m)
     sunk = Floor(floor.normal, float(heights.mean() + abs(off_m)))
     below = contact_residual(
-        skin, Contact(sunk, soles, BOTH), skinned_vertices(state, skin), CONFIG.contact
+        skin, Contact(sunk, soles, BOTH), skinned_vertices(state, skin), ContactConfig()
     )
     assert off_m < 0 or below.cost(state) > 4 * term.cost(state)
 

@@ -149,7 +149,7 @@ def fit_pose(
         data = surface.joined(outside)
         if contact is not None:
             data = data.joined(
-                contact_residual(human.skin, contact, vertices_world, config.floor.contact)
+                contact_residual(human.skin, contact, vertices_world, config.contact)
             )
         view = None
         before = state.joint_positions_world

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from kintrack.bounds import check_bounds
 from kintrack.deformation_config import DeformationConfig
 from kintrack.errors import ConfigError
-from kintrack.floor_config import FloorConfig
+from kintrack.floor_config import ContactConfig, FloorConfig
 from kintrack.objective_config import (
     MotionConfig,
     PriorConfig,
@@ -216,7 +216,9 @@ class TrackerConfig:
     pull: PullConfig = field(default_factory=PullConfig)
     """Places of the parts."""
     floor: FloorConfig = field(default_factory=FloorConfig)
-    """Feet on the floor."""
+    """The floor."""
+    contact: ContactConfig = field(default_factory=ContactConfig)
+    """Feet on it: those that are not seen stand there, others are above."""
     prior: PriorConfig = field(default_factory=PriorConfig)
     """Pose prior."""
     motion: MotionConfig = field(default_factory=MotionConfig)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from kintrack.bounds import check_bounds
 
@@ -25,7 +25,7 @@ class ContactConfig:
 
 @dataclass(frozen=True)
 class FloorConfig:
-    """Where the floor is and how it holds feet; only in labelled rooms."""
+    """Where the floor is; only in labelled rooms."""
 
     every_s: float = 0.5
     """Time between looks at the floor [s]."""
@@ -35,8 +35,6 @@ class FloorConfig:
     """How far the camera's pitch and roll may differ from what is stated [deg]."""
     stands_m: float = 0.15
     """The lower foot must be this near to a plane for it to be the floor [m]."""
-    contact: ContactConfig = field(default_factory=ContactConfig)
-    """How it holds feet while tracking: those that are not seen stand on it, others are above."""
 
     def __post_init__(self) -> None:
         check_bounds(
