@@ -101,3 +101,21 @@ def test_others_who_left_are_forgotten():
     assert len(where.others) == 1
     where = watch([(body(2, 0),)] * 3, where, start_s=CONFIG.forget_s + 1.0)
     assert where.others == ()
+
+
+def test_a_piece_of_him_that_looked_like_somebody_for_a_moment_does_not_take_his_place():
+    where = watch([(body(2, 0),)] * 10)
+    where = follow(where, None, (body(2.3, 0.3, area=0.06),), 10 * DT, CONFIG)
+    assert len(where.others) == 1
+    for n in range(60):
+        where, _ = seek(where, (), (11 + n) * DT, CONFIG)
+    back = body(2.1, 0.1)
+    where, found = seek(where, (back,), 71 * DT, CONFIG)
+    assert found is back
+
+
+def test_somebody_is_known_once_he_was_seen_for_some_frames():
+    for frames, taken in ((CONFIG.known_frames - 1, True), (CONFIG.known_frames, False)):
+        where = watch([(body(2, 0), body(2.3, 0.5))] * frames)
+        _, found = seek(where, (body(2.3, 0.5),), (frames + 5) * DT, CONFIG)
+        assert (found is not None) == taken

@@ -132,6 +132,8 @@ class WhereaboutsConfig:
     """So long after a loss nobody who may be somebody else is taken [s]."""
     forget_s: float = 8.0
     """Others not seen for this long are forgotten [s]."""
+    known_frames: int = 5
+    """Whoever was seen in fewer frames is not known to be somebody else."""
 
     def __post_init__(self) -> None:
         check_bounds(
@@ -142,6 +144,7 @@ class WhereaboutsConfig:
             carry_s=(0, 10),
             hold_s=(0, 1e4),
             forget_s=(0, 1e4),
+            known_frames=(1, 1000),
         )
 
 

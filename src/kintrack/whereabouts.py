@@ -2,8 +2,9 @@
 """Who is who from frame to frame: the person who is followed, and everybody else.
 
 While the person is tracked, everybody else in view is remembered with place and speed. Once he is
-lost, people in view are first matched to those others; who is left, and near enough to where he was
-lost, is taken to be him. After a while of waiting anybody is.
+lost, people in view are first matched to those others who were seen for some frames, not to a piece
+of himself that looked like one for a moment; who is left, and near enough to where he was lost, is
+taken to be him. After a while of waiting anybody is.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ class Known:
     """How fast [m/s]."""
     seen_s: float
     """When [s]."""
+    frames: int = 1
+    """In how many frames."""
 
     def expected(self, timestamp_s: float, carry_s: float) -> Float[ndarray, " 3"]:
         """Where he is expected by now [m]."""
@@ -39,7 +42,8 @@ class Known:
         dt = max(timestamp_s - self.seen_s, 1e-3)
         share = min(dt / 0.25, 1.0)
         speed = (place_world - self.place_world) / max(dt, 0.02)
-        return Known(place_world, (1 - share) * self.velocity + share * speed, timestamp_s)
+        velocity = (1 - share) * self.velocity + share * speed
+        return Known(place_world, velocity, timestamp_s, self.frames + 1)
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ def seek(
         return replace(where, others=_others(where, rest, timestamp_s, config)), found
     found = None
     gone_s = max(timestamp_s - own.seen_s, 0.0)
-    pairs = _pairs(where.others, people, timestamp_s, config)
+    pairs = _pairs(_known(where, config), people, timestamp_s, config)
     reach = config.reach_m + config.walk_m_s * gone_s
     for n, body in enumerate(people):
         away = float(np.linalg.norm(body.place_world - own.expected(timestamp_s, config.carry_s)))
@@ -131,12 +135,17 @@ def mine(
     own = where.own
     if own is None:
         return None
-    pairs = _pairs((own, *where.others), people, timestamp_s, config)
+    pairs = _pairs((own, *_known(where, config)), people, timestamp_s, config)
     matched: dict[int, int] = {}
     for _, who, n in sorted(pairs):
         if who not in matched and n not in matched.values():
             matched[who] = n
     return people[matched[0]] if 0 in matched else None
+
+
+def _known(where: Whereabouts, config: WhereaboutsConfig) -> tuple[Known, ...]:
+    """The others who were seen often enough to be somebody."""
+    return tuple(other for other in where.others if other.frames >= config.known_frames)
 
 
 def _large(people: tuple[Somebody, ...]) -> tuple[Somebody, ...]:
